@@ -1,0 +1,195 @@
+//! A triangle mesh as both backends read it: stored once, in f32, padded as Embree asks.
+
+use super::Bounds;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// What the indices of a face hold that can never be hit. It keeps its place, so that
+/// every other face keeps the number it has in the file.
+pub const BAD_FACE: [u32; 3] = [u32::MAX; 3];
+
+/// Largest coordinate that Embree takes; a triangle that goes beyond is dropped by it
+/// without a word (`embree.md` of Embree 4.3: `FLT_LARGE`).
+const LARGEST: f32 = 1.844e18;
+
+/// Triangles over shared vertices. Frozen once made.
+#[derive(Debug)]
+pub struct TriangleMesh {
+    /// xyz per vertex and at least one float more: Embree reads 16 bytes at a time.
+    points: Vec<f32>,
+    faces: Vec<[u32; 3]>,
+    faults: Faults,
+    bounds: Bounds,
+}
+
+/// Triangles that can never be hit, by reason.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Faults {
+    /// A vertex has a coordinate that is NaN, infinite or beyond 1.8e18.
+    pub non_finite: usize,
+    /// An index is past the last vertex.
+    pub out_of_range: usize,
+    /// No area: `|e1 x e2| == 0`, computed in f64.
+    pub degenerate: usize,
+}
+
+impl Faults {
+    /// All of them.
+    #[must_use]
+    pub fn total(&self) -> usize {
+        self.non_finite + self.out_of_range + self.degenerate
+    }
+
+    fn plus(self, o: Self) -> Self {
+        Self {
+            non_finite: self.non_finite + o.non_finite,
+            out_of_range: self.out_of_range + o.out_of_range,
+            degenerate: self.degenerate + o.degenerate,
+        }
+    }
+}
+
+impl TriangleMesh {
+    /// Takes `points` (xyz triples; what is left over counts as padding) and `faces`.
+    ///
+    /// Faces that can never be hit are counted in [`faults`](Self::faults) and their
+    /// indices replaced by [`BAD_FACE`].
+    #[must_use]
+    pub fn new(mut points: Vec<f32>, mut faces: Vec<[u32; 3]>) -> Self {
+        if points.len() % 3 == 0 {
+            points.push(0.0);
+        }
+        const CHUNK: usize = 1 << 14;
+        let (faults, bounds) = faces
+            .par_chunks_mut(CHUNK)
+            .map(|chunk| inspect(&points, chunk))
+            .reduce(|| (Faults::default(), Bounds::EMPTY), |a, b| (a.0.plus(b.0), a.1.union(b.1)));
+        Self { points, faces, faults, bounds }
+    }
+
+    /// Vertices, used or not.
+    #[must_use]
+    pub fn vertex_count(&self) -> usize {
+        self.points.len() / 3
+    }
+
+    /// Triangles as written, the ones that can never be hit included.
+    #[must_use]
+    pub fn face_count(&self) -> usize {
+        self.faces.len()
+    }
+
+    /// Vertex indices of every triangle; [`BAD_FACE`] for one that can never be hit.
+    #[must_use]
+    pub fn faces(&self) -> &[[u32; 3]] {
+        &self.faces
+    }
+
+    /// xyz of every vertex, followed by at least one float of padding.
+    #[must_use]
+    pub fn padded_points(&self) -> &[f32] {
+        &self.points
+    }
+
+    /// Position of vertex `i`.
+    ///
+    /// # Panics
+    /// If there is no such vertex.
+    #[inline]
+    #[must_use]
+    pub fn point(&self, i: u32) -> Vec3 {
+        let i = 3 * i as usize;
+        let p = &self.points[i..i + 3];
+        Vec3::new(p[0], p[1], p[2])
+    }
+
+    /// Corners of triangle `prim`, which must not be a [`BAD_FACE`].
+    ///
+    /// # Panics
+    /// If there is no such triangle, or it is bad.
+    #[inline]
+    #[must_use]
+    pub fn triangle(&self, prim: u32) -> [Vec3; 3] {
+        self.faces[prim as usize].map(|i| self.point(i))
+    }
+
+    /// Triangles that can never be hit.
+    #[must_use]
+    pub fn faults(&self) -> Faults {
+        self.faults
+    }
+
+    /// Box around every triangle that can be hit.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+
+    /// Bytes of the buffers.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.points[..]) + size_of_val(&self.faces[..])
+    }
+}
+
+fn inspect(points: &[f32], faces: &mut [[u32; 3]]) -> (Faults, Bounds) {
+    let count = points.len() / 3;
+    let mut faults = Faults::default();
+    let (mut lo, mut hi) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for face in faces {
+        if face.iter().any(|&i| i as usize >= count) {
+            faults.out_of_range += 1;
+            *face = BAD_FACE;
+            continue;
+        }
+        let p = face.map(|i| Vec3::from_slice(&points[3 * i as usize..]));
+        let (face_lo, face_hi) = (p[0].min(p[1]).min(p[2]), p[0].max(p[1]).max(p[2]));
+        let fits = |q: Vec3| q.abs().cmplt(Vec3::splat(LARGEST)).all();
+        if !p.iter().all(|&q| fits(q)) {
+            faults.non_finite += 1;
+            *face = BAD_FACE;
+        } else if !has_area(p) {
+            faults.degenerate += 1;
+            *face = BAD_FACE;
+        } else {
+            lo = lo.min(face_lo);
+            hi = hi.max(face_hi);
+        }
+    }
+    (faults, Bounds { lo: lo.as_dvec3(), hi: hi.as_dvec3() })
+}
+
+fn has_area(p: [Vec3; 3]) -> bool {
+    let [a, b, c] = p.map(Vec3::as_dvec3);
+    (b - a).cross(c - a) != DVec3::ZERO
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bad_triangles_are_counted_by_reason_and_keep_their_place() {
+        let points = vec![
+            0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 2.0, 0.0, 0.0, f32::NAN, 0.0, 0.0, f32::INFINITY, 0.0,
+            0.0, 2e18, 0.0, 0.0,
+        ];
+        let faces = vec![[0, 1, 2], [0, 1, 3], [0, 1, 4], [0, 5, 2], [0, 1, 7], [6, 1, 2], [1, 1, 2], [0, 2, 3]];
+        let mesh = TriangleMesh::new(points, faces);
+        assert_eq!(mesh.faults(), Faults { non_finite: 3, out_of_range: 1, degenerate: 2 });
+        assert_eq!(mesh.faults().total(), 6);
+        assert_eq!((mesh.vertex_count(), mesh.face_count()), (7, 8));
+        assert_eq!(mesh.faces()[0], [0, 1, 2]);
+        assert_eq!(mesh.faces()[7], [0, 2, 3]);
+        assert!(mesh.faces()[1..7].iter().all(|&f| f == BAD_FACE));
+        assert_eq!(mesh.bounds(), Bounds { lo: DVec3::ZERO, hi: DVec3::new(2.0, 1.0, 0.0) });
+        assert!(mesh.padded_points().len() > 3 * mesh.vertex_count());
+    }
+
+    #[test]
+    fn an_empty_mesh_is_a_mesh() {
+        let mesh = TriangleMesh::new(vec![], vec![]);
+        assert_eq!((mesh.vertex_count(), mesh.face_count()), (0, 0));
+        assert!(mesh.bounds().is_empty());
+    }
+}

@@ -1,0 +1,35 @@
+//! A hybrid ray tracer: Embree and a pure-Rust tracer answer the same rays.
+//!
+//! # The house
+//!
+//! Each room has one job and knows only the rooms below it:
+//!
+//! | room | job |
+//! |---|---|
+//! | [`render`] | tiles, waves of rays, shading |
+//! | [`backend`] | the seam: who answers a ray |
+//! | [`film`] | pixels in, files out |
+//! | [`scene`] | files in, one frozen scene out |
+//! | [`geom`] | rays, hits, packets, primitives |
+//! | [`math`] | floats, colour, samples |
+//!
+//! `embree` holds the safe wrapper of the C library; it and the crate `embree4-sys` are
+//! the only places with `unsafe`.
+//!
+//! # The way of one ray
+//!
+//! A tile fills packets of camera rays, the backend answers them, hits become surface
+//! points in f64, every light gets its shadow rays as one batch, and mirrored and
+//! refracted rays are the next wave.
+#![deny(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod backend;
+#[cfg(feature = "embree")]
+#[allow(unsafe_code, reason = "the one room that talks to C")]
+pub mod embree;
+pub mod film;
+pub mod geom;
+pub mod math;
+pub mod render;
+pub mod scene;
