@@ -86,8 +86,6 @@ pub struct RenderStats {
     pub non_finite_samples: u64,
     /// Shadow rays not sent because the light is behind the surface.
     pub shadow_rays_facing_away: u64,
-    /// Camera rays that never reached the backend because they miss the scene's box.
-    pub rays_outside_bounds: u64,
     /// Branches below the weight cut.
     pub branches_below_cut: u64,
 }
