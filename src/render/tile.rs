@@ -61,12 +61,6 @@ pub fn segments(pixels: &[(u32, u32)], spp: u32) -> impl Iterator<Item = Segment
 }
 
 impl Segment<'_> {
-    /// Rays of the segment.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.pixels.len() * self.samples as usize
-    }
-
     /// Fills `batch` with the camera rays.
     pub fn camera_rays(&self, camera: &Camera, job: &Job, batch: &mut PacketBatch<RayHitPacket>) {
         batch.clear();
@@ -132,9 +126,9 @@ mod tests {
         for spp in [1, 2, 5, 16, 17, 70] {
             let mut next = vec![0; all.len()];
             let mut at = std::collections::HashMap::new();
-            all.iter().enumerate().for_each(|(i, &p)| drop(at.insert(p, i)));
+            at.extend(all.iter().enumerate().map(|(i, &p)| (p, i)));
             for s in segments(&all, spp) {
-                assert!(s.len() <= SEGMENT && s.len() > 0);
+                assert!((1..=SEGMENT).contains(&(s.pixels.len() * s.samples as usize)));
                 for p in s.pixels {
                     assert_eq!(next[at[p]], s.first, "spp {spp}");
                     next[at[p]] += s.samples;
