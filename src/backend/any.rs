@@ -81,6 +81,18 @@ pub enum Error {
     #[cfg(feature = "embree")]
     #[error(transparent)]
     Embree(crate::embree::Error),
+    /// The native tracer's own.
+    #[error(transparent)]
+    Native(native::BuildError),
+}
+
+impl From<native::BuildError> for Error {
+    fn from(e: native::BuildError) -> Self {
+        match e {
+            native::BuildError::Cancelled => Self::Cancelled,
+            other => Self::Native(other),
+        }
+    }
 }
 
 /// A backend of either kind, ready to answer.
@@ -110,7 +122,7 @@ impl AnyBackend {
                 let quality =
                     if options.prefers_quick_build(scene) { native::Quality::Fast } else { native::Quality::Good };
                 let build = native::BuildOptions { quality, cancel: options.cancel };
-                native::Native::build(&meshes, &build).map(Self::Native).map_err(|native::Cancelled| Error::Cancelled)
+                Ok(Self::Native(native::Native::build(&meshes, &build)?))
             }
         }
     }
