@@ -242,7 +242,8 @@ case $plan in
 esac
 printf '\nRunning as root:\n\n%s\n\n' "$plan"
 # shellcheck disable=SC2086
-$sudo $quietly sh -euc "$plan" || die 'the commands above did not succeed; it is safe to run this script again.'
+$sudo $quietly sh -euc "$plan" || die 'the commands above did not succeed; it is safe to run this script again.
+If apt stopped because it would have to remove packages and you agree to it, run its command without --no-remove first.'
 
 look
 [ -z "$missing" ] || die "still missing: $missing."

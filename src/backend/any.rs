@@ -139,11 +139,11 @@ impl AnyBackend {
 
     /// Bytes of the hierarchy, without the mesh buffers.
     #[must_use]
-    pub fn bytes(&self) -> usize {
+    pub fn bytes(&self) -> u64 {
         match self {
             #[cfg(feature = "embree")]
             Self::Embree(b) => b.bytes(),
-            Self::Native(b) => b.bytes(),
+            Self::Native(b) => b.bytes() as u64,
         }
     }
 

@@ -39,7 +39,7 @@ impl EmbreeBackend {
 
     /// Bytes that Embree holds.
     #[must_use]
-    pub fn bytes(&self) -> usize {
+    pub fn bytes(&self) -> u64 {
         self.device.memory_live()
     }
 

@@ -62,7 +62,7 @@ impl SurfacePoint {
     /// Source: J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, ch. 4.
     #[inline]
     fn interpolate(&mut self, object: &Object, prim: u32, corners: [Vec3; 3], r: &triangle::Refined) -> DVec3 {
-        let Some(normals) = object.normals.as_ref().and_then(|n| n.triangle(&object.mesh, prim)) else {
+        let Some(normals) = object.corner_normals(prim) else {
             return self.p;
         };
         let weights = [1.0 - r.u - r.v, r.u, r.v];

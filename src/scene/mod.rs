@@ -77,6 +77,15 @@ pub struct SceneCounts {
 }
 
 impl Object {
+    /// Normals at the corners of triangle `prim`; `None` unless all three have one.
+    #[inline]
+    #[must_use]
+    pub fn corner_normals(&self, prim: u32) -> Option<[Vec3; 3]> {
+        let normals = self.normals.as_ref()?;
+        let [a, b, c] = normals.of(self.mesh.faces(), prim as usize).map(|i| normals.get::<3>(i).map(Vec3::from));
+        Some([a?, b?, c?])
+    }
+
     /// Index of the material of triangle `prim`.
     #[inline]
     #[must_use]
