@@ -254,6 +254,27 @@ impl<P: RayQueue> PacketBatch<P> {
         self.len += 1;
     }
 
+    /// Appends a whole packet for the caller to fill. A lane that asks nothing has a `t_far`
+    /// of minus infinity, and keeps it.
+    ///
+    /// # Panics
+    /// If the last packet is not full.
+    #[inline]
+    pub fn push_packet(&mut self) -> &mut P {
+        assert_eq!(self.len % LANES, 0, "a packet cannot follow a partly filled one");
+        let packet = self.len / LANES;
+        if packet == self.packets.len() {
+            self.packets.push(P::EMPTY);
+        }
+        self.len += LANES;
+        &mut self.packets[packet]
+    }
+
+    /// Takes back the last packet.
+    pub fn pop_packet(&mut self) {
+        self.len = self.len.saturating_sub(1) / LANES * LANES;
+    }
+
     /// The packets in use.
     #[must_use]
     pub fn packets(&self) -> &[P] {

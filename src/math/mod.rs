@@ -2,7 +2,9 @@
 
 pub mod colour;
 mod frame;
+mod pow;
 mod sampling;
 
 pub use frame::Frame;
+pub use pow::pow01;
 pub use sampling::{PixelSamples, concentric_disc};

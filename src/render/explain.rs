@@ -1,12 +1,12 @@
 //! One pixel told in words: every ray of its first sample and what became of it.
 
+use super::block::Block;
 use super::job::Job;
-use super::shade;
 use super::surface::SurfacePoint;
 use super::tile::Segment;
-use super::wave::BEFORE_THE_LIGHT;
+use super::{lights, shade};
 use crate::backend::{AnyBackend, Backend};
-use crate::geom::{PacketBatch, Ray};
+use crate::geom::{Coherence, LANES, PacketBatch, Ray, RayPacket};
 use crate::scene::{CameraDesc, Scene};
 use glam::{DVec3, Vec3};
 use std::fmt::Write;
@@ -80,8 +80,9 @@ impl<B: Backend> Teller<'_, B> {
             *out += &format!("{indent}{} weight {weight:.4}: nothing hit, background adds {}\n", this.what, rgb(add));
             return add;
         };
-        let point = SurfacePoint::new(self.scene, this.ray.o, this.ray.d, &hit);
-        let m = &self.scene.materials[point.material as usize];
+        let mut block = Block::single(self.scene, &this.ray, &hit);
+        let point = SurfacePoint::of_lane(&block, 0);
+        let m = &self.scene.materials[point.material];
         let p = self.scene.frame.to_world(point.p);
         let far = point.t * this.ray.d.as_dvec3().length() * self.scene.frame.world_per_local();
         *out += &format!(
@@ -93,17 +94,21 @@ impl<B: Backend> Teller<'_, B> {
         *out += &format!("{indent}  ambient and emission: {}\n", rgb(this.weight * own));
         let mut add = this.weight * own;
         for (i, light) in self.scene.lights.iter().enumerate() {
-            let l = light.position - point.p;
-            if point.ng.dot(l) <= 0.0 || point.ns.dot(l) <= 0.0 {
-                *out += &format!("{indent}  light {i}: behind the surface\n");
+            let mut batch = PacketBatch::<RayPacket>::default();
+            let (sent, facing_away) = lights::aim(&block, light, batch.push_packet());
+            if sent == 0 {
+                let why = if facing_away > 0 { "behind the surface" } else { "nothing to light" };
+                *out += &format!("{indent}  light {i}: {why}\n");
                 continue;
             }
-            let d = (light.position - point.front.as_dvec3()).as_vec3();
-            if self.backend.occluded(&Ray::segment(point.front, d, BEFORE_THE_LIGHT)) {
+            self.backend.occluded_many(&mut batch, Coherence::Coherent);
+            if batch.packets()[0].is_occluded(0) {
                 *out += &format!("{indent}  light {i}: in shadow\n");
                 continue;
             }
-            let lit = this.weight * light.color * shade::lit(m, &point, d.normalize());
+            block.color = [[0.0; LANES]; 3];
+            lights::add(&mut block, light, &batch.packets()[0]);
+            let lit = this.weight * Block::vec3(&block.color, 0);
             *out += &format!("{indent}  light {i}: {}\n", rgb(lit));
             add += lit;
         }
@@ -112,7 +117,7 @@ impl<B: Backend> Teller<'_, B> {
     }
 
     fn branches(&self, this: &Pending, point: &SurfacePoint, stack: &mut Vec<Pending>, out: &mut String, indent: &str) {
-        let m = &self.scene.materials[point.material as usize];
+        let m = &self.scene.materials[point.material];
         if !(m.reflects() || m.refracts()) {
             return;
         }

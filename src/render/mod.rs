@@ -1,8 +1,10 @@
 //! From a frozen scene and a backend to a film: tiles, waves of rays, shading.
 
+mod block;
 mod certificate;
 mod explain;
 mod job;
+mod lights;
 pub mod optics;
 mod shade;
 mod surface;
@@ -159,7 +161,7 @@ struct PixelSum {
 
 impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
     fn new(render: &'a Render<'a, B, SECONDARY>, radiance: &'a Radiance) -> Self {
-        let waves = Waves::new(render.scene, render.backend, render.job, render.needs, radiance);
+        let waves = Waves::new(render.scene, render.backend, render.job, &render.needs, radiance);
         Self { render, waves, batch: PacketBatch::default(), pixels: Vec::new(), sums: Vec::new() }
     }
 
@@ -212,7 +214,7 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
             let (packet, lane) = (&self.batch.packets()[slot / LANES], slot % LANES);
             let Some(hit) = packet.hit(lane) else { continue };
             let ray = packet.ray.get(lane);
-            let point = surface::SurfacePoint::new(scene, ray.o, ray.d, &hit);
+            let point = surface::SurfacePoint::new(scene, &ray, &hit);
             let sum = &mut self.sums[first_pixel + slot / samples];
             if slot % samples == 0 && segment.first == 0 {
                 sum.id = [hit.geom_id + 1, hit.prim_id + 1];
@@ -220,7 +222,7 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
             sum.hits += 1;
             sum.depth += point.t * ray.d.as_dvec3().length() * scene.frame.world_per_local();
             sum.normal += point.ns;
-            sum.albedo += scene.materials[point.material as usize].diffuse;
+            sum.albedo += scene.materials[point.material].diffuse;
         }
     }
 

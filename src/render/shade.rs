@@ -1,26 +1,9 @@
-//! What a lit surface sends back: Blinn-Phong, and the branches that go on.
+//! The branches that go on from a hit.
 
 use super::optics;
 use super::surface::SurfacePoint;
 use crate::scene::{Material, Reflect};
 use glam::{DVec3, Vec3};
-
-/// Answer of `material` at `point` to a light of colour 1 in the direction `l` (unit).
-///
-/// Source: J. F. Blinn, "Models of Light Reflection for Computer Synthesized Pictures",
-/// SIGGRAPH 1977: the half vector between light and eye instead of Phong's mirrored one.
-#[inline]
-#[must_use]
-pub fn lit(material: &Material, point: &SurfacePoint, l: Vec3) -> Vec3 {
-    let ns = point.ns.as_vec3();
-    let diffuse = material.diffuse * ns.dot(l).max(0.0);
-    if material.specular == Vec3::ZERO {
-        return diffuse;
-    }
-    let h = (l + point.to_eye).normalize_or_zero();
-    let cos = ns.dot(h).max(0.0);
-    diffuse + material.specular * cos.powf(material.shininess)
-}
 
 /// A ray that goes on from a hit.
 #[derive(Clone, Copy, Debug)]
@@ -92,7 +75,6 @@ mod tests {
             ng: DVec3::Y,
             ns: DVec3::Y,
             to_eye: Vec3::Y,
-            front: Vec3::ZERO,
             extent: 1.0,
             material: 0,
             entering,
@@ -102,17 +84,6 @@ mod tests {
 
     fn glass(reflect: Reflect) -> Material {
         Material { reflect, refract: Vec3::splat(0.9), ior: 1.5, ..Material::default() }
-    }
-
-    #[test]
-    fn blinn_phong_by_hand() {
-        let m = Material { diffuse: Vec3::new(0.5, 0.25, 0.0), specular: Vec3::splat(0.5), shininess: 2.0, ..Material::default() };
-        let l = Vec3::new(0.6, 0.8, 0.0);
-        // h halves the angle between l and +y: cos(2a) = 0.8, cos(a)^2 = 0.9.
-        let want = m.diffuse * 0.8 + Vec3::splat(0.45);
-        assert!((lit(&m, &point(true), l) - want).length() < 1e-6);
-        let dull = Material { specular: Vec3::ZERO, ..m };
-        assert_eq!(lit(&dull, &point(true), l), dull.diffuse * 0.8);
     }
 
     #[test]

@@ -1,10 +1,11 @@
-//! From a reported hit to a point that can be shaded.
+//! One shaded point by itself, as branches and auxiliary images ask for it.
 
-use crate::geom::{Hit, offset_origin, triangle};
-use crate::scene::{Object, Scene};
+use super::block::Block;
+use crate::geom::{Hit, Ray, offset_origin};
+use crate::scene::Scene;
 use glam::{DVec3, Vec3};
 
-/// Everything shading asks about a hit, f64 where a decision hangs on it.
+/// A lane of a [`Block`].
 #[derive(Clone, Copy, Debug)]
 pub struct SurfacePoint {
     /// The point, scene space.
@@ -15,13 +16,10 @@ pub struct SurfacePoint {
     pub ns: DVec3,
     /// Unit vector back along the ray.
     pub to_eye: Vec3,
-    /// Where rays start that leave on the ray's side; over a smooth surface lifted out of
-    /// the facet's shadow.
-    pub front: Vec3,
     /// Size of the primitive, for offsets.
     pub extent: f64,
     /// Index of the material.
-    pub material: u32,
+    pub material: usize,
     /// Whether the ray met the side that the winding calls outer.
     pub entering: bool,
     /// Ray parameter.
@@ -29,62 +27,26 @@ pub struct SurfacePoint {
 }
 
 impl SurfacePoint {
-    /// Widens `hit` of the ray `o + t d`.
-    #[inline]
+    /// Widens `hit` of `ray`.
     #[must_use]
-    pub fn new(scene: &Scene, o: Vec3, d: Vec3, hit: &Hit) -> Self {
-        let object = &scene.objects[hit.geom_id as usize];
-        let corners = object.mesh.triangle(hit.prim_id);
-        let r = triangle::refine(o, d, corners, (hit.u, hit.v));
-        let outer = r.ng.normalize();
-        let entering = outer.dot(d.as_dvec3()) < 0.0;
-        let ng = if entering { outer } else { -outer };
-        let mut point = Self {
-            p: r.p,
-            ng,
-            ns: ng,
-            to_eye: -d.normalize(),
-            front: Vec3::ZERO,
-            extent: r.extent,
-            material: object.material(hit.prim_id) as u32,
-            entering,
-            t: r.t,
-        };
-        let lifted = point.interpolate(object, hit.prim_id, corners, &r);
-        point.front = offset_origin(lifted, ng, r.extent);
-        point
+    pub fn new(scene: &Scene, ray: &Ray, hit: &Hit) -> Self {
+        Self::of_lane(&Block::single(scene, ray, hit), 0)
     }
 
-    /// Takes the shading normal from the corners where they have one. Returns the point from
-    /// which the surface that the normals pretend would cast its shadows: the facet's own
-    /// point lifted onto the corners' tangent planes where those lie outside.
-    ///
-    /// Source: J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, ch. 4.
+    /// Takes one out of a block.
     #[inline]
-    fn interpolate(&mut self, object: &Object, prim: u32, corners: [Vec3; 3], r: &triangle::Refined) -> DVec3 {
-        let Some(normals) = object.corner_normals(prim) else {
-            return self.p;
-        };
-        let weights = [1.0 - r.u - r.v, r.u, r.v];
-        let side = if self.entering { 1.0 } else { -1.0 };
-        let n: [DVec3; 3] = normals.map(|n| n.as_dvec3() * side);
-        let sum = n[0] * weights[0] + n[1] * weights[1] + n[2] * weights[2];
-        let length = sum.length();
-        // Normals that cancel say nothing.
-        if !(length > 1e-6) {
-            return self.p;
+    #[must_use]
+    pub fn of_lane(block: &Block, lane: usize) -> Self {
+        Self {
+            p: Block::dvec3(&block.p, lane),
+            ng: Block::dvec3(&block.ng, lane),
+            ns: Block::dvec3(&block.ns, lane),
+            to_eye: Block::vec3(&block.to_eye, lane),
+            extent: block.extent[lane],
+            material: block.material[lane] as usize,
+            entering: block.entering[lane],
+            t: block.t[lane],
         }
-        let ns = sum / length;
-        let facing = ns.dot(self.ng) >= 0.0;
-        self.ns = if facing { ns } else { -ns };
-        if !facing {
-            return self.p;
-        }
-        let lift = |i: usize| {
-            let below = (self.p - corners[i].as_dvec3()).dot(n[i]).min(0.0);
-            n[i] * (weights[i] * below)
-        };
-        self.p - (lift(0) + lift(1) + lift(2))
     }
 
     /// Where a ray starts that leaves along `w` on its side of the facet.

@@ -1,10 +1,10 @@
 //! A tile of the image: which rays it sends and where their colours go.
 
 use super::job::{Crop, Job};
-use crate::math::PixelSamples;
-use crate::math::concentric_disc;
-use crate::scene::Camera;
-use crate::geom::{LANES, PacketBatch, Ray, RayHitPacket};
+use crate::geom::{LANES, PacketBatch, RayHitPacket};
+use crate::math::{PixelSamples, concentric_disc};
+use crate::scene::{Camera, CameraRays};
+use crate::simd;
 use glam::DVec2;
 
 /// Pixels along the side of a tile.
@@ -15,8 +15,8 @@ const SEGMENT: usize = 4096;
 
 /// Where a lone sample goes through its pixel: beside the centre, so that a camera aligned
 /// with a mesh does not send every ray at a vertex or along an edge.
-const BESIDE_CENTRE: f64 = 0.5;
-const BESIDE: (f64, f64) = (BESIDE_CENTRE + 0.000_37, BESIDE_CENTRE + 0.000_61);
+const BESIDE_CENTRE: (f64, f64) = (0.500_37, 0.500_61);
+const CENTRE: (f64, f64) = (0.5, 0.5);
 
 /// The tiles of `crop`, row by row.
 #[must_use]
@@ -63,30 +63,35 @@ pub fn segments(pixels: &[(u32, u32)], spp: u32) -> impl Iterator<Item = Segment
 impl Segment<'_> {
     /// Fills `batch` with the camera rays.
     pub fn camera_rays(&self, camera: &Camera, job: &Job, batch: &mut PacketBatch<RayHitPacket>) {
-        batch.clear();
-        let lone = if job.centre { (BESIDE_CENTRE, BESIDE_CENTRE) } else { BESIDE };
-        for &(x, y) in self.pixels {
-            let at = |dx: f64, dy: f64| (f64::from(x) + dx, f64::from(y) + dy);
-            if job.spp == 1 && camera.lens.is_none() {
-                let (px, py) = at(lone.0, lone.1);
-                push(batch, camera, px, py, DVec2::ZERO);
-                continue;
+        let rays = self.pixels.len() * self.samples as usize;
+        batch.resize(rays);
+        let (mut at, mut lens) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
+        for (k, (packet, live)) in batch.packets_mut().enumerate() {
+            for lane in 0..live {
+                let ray = k * LANES + lane;
+                let pixel = self.pixels[ray / self.samples as usize];
+                let sample = self.first + (ray % self.samples as usize) as u32;
+                let (x, y, disc) = image_point(camera, job, pixel, sample);
+                (at[0][lane], at[1][lane]) = (x, y);
+                (lens[0][lane], lens[1][lane]) = (disc.x, disc.y);
             }
-            let points = PixelSamples::new(x, y, job.seed);
-            for j in self.first..self.first + self.samples {
-                let [a, b, u, v] = points.point(j).map(f64::from);
-                let (px, py) = if job.spp == 1 { at(lone.0, lone.1) } else { at(a, b) };
-                let lens = if camera.lens.is_some() { concentric_disc(u, v) } else { DVec2::ZERO };
-                push(batch, camera, px, py, lens);
-            }
+            simd::run(CameraRays { camera, at: &at, lens: &lens, packet: &mut packet.ray });
         }
     }
 }
 
+/// Where sample `sample` of `pixel` goes through the image, in pixels, and through the unit lens.
 #[inline]
-fn push(batch: &mut PacketBatch<RayHitPacket>, camera: &Camera, px: f64, py: f64, lens: DVec2) {
-    let (o, d) = camera.ray(px, py, lens);
-    batch.push(&Ray::new(o.as_vec3(), d.as_vec3()));
+fn image_point(camera: &Camera, job: &Job, pixel: (u32, u32), sample: u32) -> (f64, f64, DVec2) {
+    let (x, y) = (f64::from(pixel.0), f64::from(pixel.1));
+    let lone = if job.centre { CENTRE } else { BESIDE_CENTRE };
+    if job.spp == 1 && camera.lens.is_none() {
+        return (x + lone.0, y + lone.1, DVec2::ZERO);
+    }
+    let [a, b, u, v] = PixelSamples::new(pixel.0, pixel.1, job.seed).point(sample).map(f64::from);
+    let (dx, dy) = if job.spp == 1 { lone } else { (a, b) };
+    let disc = if camera.lens.is_some() { concentric_disc(u, v) } else { DVec2::ZERO };
+    (x + dx, y + dy, disc)
 }
 
 #[cfg(test)]

@@ -1,32 +1,21 @@
 //! Waves of rays: a segment of camera rays, their shadow rays, and whatever they send on,
 //! without recursion.
 
+use super::block::{Block, Facets, Paint, Path};
 use super::certificate::Radiance;
 use super::job::{Job, RayCounts};
+use super::lights;
 use super::shade::{self, Branch};
 use super::surface::SurfacePoint;
 use crate::backend::Backend;
+use crate::film::Aov;
 use crate::geom::{Coherence, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
-use crate::scene::{Needs, Scene};
+use crate::scene::{Light, Needs, Scene};
 use glam::{DVec3, Vec3};
 
 /// Most secondary rays worked on at once; the rest waits, newest first, so that memory is
 /// bounded by depth and not by the number of branches.
 const MOST_AT_ONCE: usize = 1 << 14;
-
-/// End of a shadow ray that was sent at a light: just short of it.
-pub const BEFORE_THE_LIGHT: f32 = 1.0 - 4.0 * 0.5 * f32::EPSILON;
-
-/// Where a ray's colour goes and how much of it.
-#[derive(Clone, Copy, Debug)]
-pub struct Path {
-    /// Sample that the colour belongs to.
-    pub slot: u32,
-    /// Bounces so far.
-    pub depth: u32,
-    /// Share of the ray's colour that arrives in the sample.
-    pub weight: Vec3,
-}
 
 /// A secondary ray that waits for its turn.
 #[derive(Clone, Copy, Debug)]
@@ -64,10 +53,19 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
     scene: &'a Scene,
     backend: &'a B,
     job: &'a Job,
-    needs: Needs,
     radiance: &'a Radiance,
-    points: Vec<(Path, SurfacePoint)>,
+    /// The lights that can change anything.
+    lights: Vec<Light>,
+    /// Of each material.
+    paints: Vec<Paint>,
+    /// Of each material: whether it sends rays on.
+    branching: Vec<bool>,
+    facets: Box<Facets>,
+    blocks: Vec<Block>,
+    /// Blocks in use.
+    used: usize,
     shadows: PacketBatch<RayPacket>,
+    /// The block of each shadow packet.
     shadowed: Vec<u32>,
     waiting: Vec<Waiting>,
     /// What the current segment gathers.
@@ -78,15 +76,20 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
 
 impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     /// An integrator with empty buffers.
-    pub fn new(scene: &'a Scene, backend: &'a B, job: &'a Job, needs: Needs, radiance: &'a Radiance) -> Self {
-        let cost = job.aovs.contains(&crate::film::Aov::Cost).then(Vec::new);
+    pub fn new(scene: &'a Scene, backend: &'a B, job: &'a Job, needs: &Needs, radiance: &'a Radiance) -> Self {
+        let cost = job.aovs.contains(&Aov::Cost).then(Vec::new);
+        let lights = scene.lights.iter().filter(|l| needs.shadow_rays && l.color != Vec3::ZERO);
         Self {
             scene,
             backend,
             job,
-            needs,
             radiance,
-            points: Vec::new(),
+            lights: lights.copied().collect(),
+            paints: scene.materials.iter().map(|m| Paint::new(m, scene.ambient)).collect(),
+            branching: scene.materials.iter().map(|m| m.reflects() || m.refracts()).collect(),
+            facets: Box::new(Facets::EMPTY),
+            blocks: Vec::new(),
+            used: 0,
             shadows: PacketBatch::default(),
             shadowed: Vec::new(),
             waiting: Vec::new(),
@@ -109,7 +112,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         }
         self.tally.rays.camera += samples as u64;
         self.backend.intersect_many(batch, coherence);
-        self.collect(batch, |i| Path { slot: i as u32, depth: 0, weight: Vec3::ONE });
+        self.collect(batch, |i| Path::of_sample(i as u32));
         self.shade();
         if SECONDARY {
             self.secondary_waves();
@@ -133,32 +136,52 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         }
     }
 
-    /// Misses take the background, hits become surface points.
+    /// Misses take the background, hits fill blocks.
     fn collect(&mut self, batch: &PacketBatch<RayHitPacket>, path: impl Fn(usize) -> Path) {
-        self.points.clear();
+        self.used = 0;
+        let mut lane = 0;
         for (k, packet) in batch.packets().iter().enumerate() {
             let live = (batch.len() - k * LANES).min(LANES);
-            for lane in 0..live {
-                let path = path(k * LANES + lane);
-                let Some(hit) = packet.hit(lane) else {
+            for i in 0..live {
+                let path = path(k * LANES + i);
+                let Some(hit) = packet.hit(i) else {
                     self.gathered.color[path.slot as usize] += (path.weight * self.scene.background).as_dvec3();
                     continue;
                 };
-                let ray = packet.ray.get(lane);
-                self.points.push((path, SurfacePoint::new(self.scene, ray.o, ray.d, &hit)));
+                if self.used == self.blocks.len() {
+                    self.blocks.push(Block::EMPTY);
+                }
+                let object = &self.scene.objects[hit.geom_id as usize];
+                let material = object.material(hit.prim_id);
+                self.facets.set(lane, object, &packet.ray.get(i), &hit);
+                self.blocks[self.used].set(lane, &path, material, &self.paints[material]);
+                lane += 1;
+                if lane == LANES {
+                    self.finish_block(lane);
+                    lane = 0;
+                }
             }
+        }
+        if lane > 0 {
+            self.finish_block(lane);
         }
     }
 
+    fn finish_block(&mut self, len: usize) {
+        let block = &mut self.blocks[self.used];
+        block.len = len;
+        block.finish(&self.facets);
+        self.used += 1;
+    }
+
     fn shade(&mut self) {
-        for (path, point) in &self.points {
-            let m = &self.scene.materials[point.material as usize];
-            let own = m.emission + m.ambient * self.scene.ambient;
-            self.gathered.color[path.slot as usize] += (path.weight * own).as_dvec3();
+        for index in 0..self.lights.len() {
+            self.light(index);
         }
-        if self.needs.shadow_rays {
-            for light in 0..self.scene.lights.len() {
-                self.light(light);
+        for block in &self.blocks[..self.used] {
+            for lane in 0..block.len {
+                let add = Block::vec3(&block.weight, lane) * Block::vec3(&block.color, lane);
+                self.gathered.color[block.slot[lane] as usize] += add.as_dvec3();
             }
         }
         if SECONDARY {
@@ -166,67 +189,56 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         }
     }
 
-    /// Adds one light to all points: its shadow rays go out as one batch.
+    /// Adds one light to all blocks: its shadow rays go out as one batch.
     fn light(&mut self, index: usize) {
-        let light = self.scene.lights[index];
-        if light.color == Vec3::ZERO {
-            return;
-        }
+        let light = self.lights[index];
         self.shadows.clear();
         self.shadowed.clear();
-        for (i, (_, point)) in self.points.iter().enumerate() {
-            if !self.scene.materials[point.material as usize].is_lit() {
+        for (i, block) in self.blocks[..self.used].iter().enumerate() {
+            let packet = self.shadows.push_packet();
+            let (sent, facing_away) = lights::aim(block, &light, packet);
+            self.tally.facing_away += u64::from(facing_away);
+            self.tally.rays.shadow += u64::from(sent);
+            if sent == 0 {
+                self.shadows.pop_packet();
                 continue;
             }
-            let l = light.position - point.p;
-            // Dark for the facet is dark, whatever an interpolated normal says.
-            if point.ng.dot(l) <= 0.0 || point.ns.dot(l) <= 0.0 {
-                self.tally.facing_away += 1;
-                continue;
-            }
-            let d = (light.position - point.front.as_dvec3()).as_vec3();
-            self.shadows.push(&Ray::segment(point.front, d, BEFORE_THE_LIGHT));
             self.shadowed.push(i as u32);
-        }
-        self.tally.rays.shadow += self.shadows.len() as u64;
-        if let Some(cost) = &mut self.gathered.cost {
-            self.shadowed.iter().for_each(|&i| cost[self.points[i as usize].0.slot as usize] += 1);
+            if let Some(cost) = &mut self.gathered.cost {
+                let lanes = (0..block.len).filter(|&lane| packet.t_far[lane] > 0.0);
+                lanes.for_each(|lane| cost[block.slot[lane] as usize] += 1);
+            }
         }
         self.backend.occluded_many(&mut self.shadows, Coherence::Coherent);
-        for (packet, indices) in self.shadows.packets().iter().zip(self.shadowed.chunks(LANES)) {
-            for (lane, &i) in indices.iter().enumerate() {
-                if packet.is_occluded(lane) {
-                    continue;
-                }
-                let (path, point) = &self.points[i as usize];
-                let m = &self.scene.materials[point.material as usize];
-                let l = Vec3::new(packet.d_x[lane], packet.d_y[lane], packet.d_z[lane]).normalize();
-                let add = path.weight * light.color * shade::lit(m, point, l);
-                self.gathered.color[path.slot as usize] += add.as_dvec3();
-            }
+        for (packet, &i) in self.shadows.packets().iter().zip(&self.shadowed) {
+            lights::add(&mut self.blocks[i as usize], &light, packet);
         }
     }
 
-    /// Sends on the mirrored and refracted branches of all points.
+    /// Sends on the mirrored and refracted branches of all blocks.
     fn branch(&mut self) {
-        let points = std::mem::take(&mut self.points);
-        for (path, point) in &points {
-            let m = &self.scene.materials[point.material as usize];
-            if !(m.reflects() || m.refracts()) {
-                continue;
-            }
-            let d = -point.to_eye.as_dvec3().normalize();
-            let (reflected, refracted) = shade::branches(m, point, d);
-            if let Some(b) = reflected.and_then(|b| self.worth_sending(path, &b)) {
-                self.tally.rays.reflected += 1;
-                self.send(b, path, point);
-            }
-            if let Some(b) = refracted.and_then(|b| self.worth_sending(path, &b)) {
-                self.tally.rays.refracted += 1;
-                self.send(b, path, point);
+        let blocks = std::mem::take(&mut self.blocks);
+        for block in &blocks[..self.used] {
+            for lane in 0..block.len {
+                if !self.branching[block.material[lane] as usize] {
+                    continue;
+                }
+                let point = SurfacePoint::of_lane(block, lane);
+                let weight = Block::vec3(&block.weight, lane);
+                let path = Path { slot: block.slot[lane], depth: block.depth[lane], weight };
+                let d = -point.to_eye.as_dvec3().normalize();
+                let (reflected, refracted) = shade::branches(&self.scene.materials[point.material], &point, d);
+                if let Some(b) = reflected.and_then(|b| self.worth_sending(&path, &b)) {
+                    self.tally.rays.reflected += 1;
+                    self.send(b, &path, &point);
+                }
+                if let Some(b) = refracted.and_then(|b| self.worth_sending(&path, &b)) {
+                    self.tally.rays.refracted += 1;
+                    self.send(b, &path, &point);
+                }
             }
         }
-        self.points = points;
+        self.blocks = blocks;
     }
 
     /// The branch with its weight in the sample, or `None`, accounted for, if it is cut.

@@ -1,6 +1,8 @@
 //! Cameras: as a user gives them, in world space.
 
+use crate::geom::{LANES, RayPacket};
 use crate::math::Frame;
+use crate::simd::Kernel;
 use glam::{DVec2, DVec3};
 
 /// A camera as given: world space, f64.
@@ -146,6 +148,45 @@ impl Camera {
     }
 }
 
+/// [`Camera::ray`] for a packet: image points and points of the unit disc, one per lane.
+#[derive(Debug)]
+pub struct CameraRays<'a> {
+    /// The camera.
+    pub camera: &'a Camera,
+    /// Image points in pixels: x, y.
+    pub at: &'a [[f64; LANES]; 2],
+    /// Lens points.
+    pub lens: &'a [[f64; LANES]; 2],
+    /// Where the rays go.
+    pub packet: &'a mut RayPacket,
+}
+
+impl Kernel for CameraRays<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let c = self.camera;
+        let (across, up, focus) = c.lens.map_or((DVec3::ZERO, DVec3::ZERO, 1.0), |l| (l.across, l.up, l.focus));
+        let (mut o, mut d) = ([[0f32; LANES]; 3], [[0f32; LANES]; 3]);
+        for k in 0..3 {
+            for i in 0..LANES {
+                let at = c.corner[k] + c.right[k] * self.at[0][i] + c.down[k] * self.at[1][i];
+                let shift = across[k] * self.lens[0][i] + up[k] * self.lens[1][i];
+                let (from, along) = if c.parallel { (at, c.forward[k]) } else { (c.eye[k], at) };
+                o[k][i] = (from + shift) as f32;
+                let along = (along - shift / focus) as f32;
+                d[k][i] = if along.abs() < f32::MIN_POSITIVE { 0.0 } else { along };
+            }
+        }
+        let p = self.packet;
+        [p.o_x, p.o_y, p.o_z] = o;
+        [p.d_x, p.d_y, p.d_z] = d;
+        p.t_near = [0.0; LANES];
+        p.t_far = [f32::INFINITY; LANES];
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -197,6 +238,23 @@ mod tests {
             };
             for p in [DVec2::X, DVec2::NEG_Y, DVec2::new(0.3, -0.6)] {
                 assert!((meet(p) - meet(DVec2::ZERO)).length() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn a_packet_holds_the_rays_one_by_one() {
+        let lens = CameraDesc { aperture: 0.3, focus: Some(4.0), ..desc() };
+        for d in [desc(), lens, CameraDesc { projection: Projection::Orthographic { height: 3.0 }, ..lens }] {
+            let camera = d.prepare(&frame(), (64, 48)).expect("a good camera");
+            let at = [std::array::from_fn(|i| i as f64 * 3.7), std::array::from_fn(|i| 40.0 - i as f64 * 2.1)];
+            let disc = [std::array::from_fn(|i| (i as f64).sin() * 0.7), std::array::from_fn(|i| (i as f64).cos() * 0.7)];
+            let mut packet = RayPacket::EMPTY;
+            crate::simd::run(CameraRays { camera: &camera, at: &at, lens: &disc, packet: &mut packet });
+            for i in 0..LANES {
+                let (o, d) = camera.ray(at[0][i], at[1][i], DVec2::new(disc[0][i], disc[1][i]));
+                let ray = packet.get(i);
+                assert_eq!((ray.o, ray.d), (o.as_vec3(), d.as_vec3()));
             }
         }
     }

@@ -15,7 +15,7 @@ mod needs;
 pub mod obj;
 pub mod smooth;
 
-pub use camera::{Camera, CameraDesc, Projection};
+pub use camera::{Camera, CameraDesc, CameraRays, Projection};
 pub use error::{Error, Warning};
 pub use framing::{CameraOverrides, View};
 pub use light::Light;

@@ -22,9 +22,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let args = Args::parse()?;
     let threads = args.threads;
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+    let model = args.model()?;
     let cancel = AtomicBool::new(false);
     let options = LoadOptions { smooth: None, allow: vec![], cancel: &cancel, progress: None };
-    let mut scene = scene::load(&args.model, &options)?.scene;
+    let mut scene = scene::load(&model, &options)?.scene;
     let aspect = f64::from(args.size.0) / f64::from(args.size.1);
     let camera = scene.auto_camera(View::ThreeQuarter, &args.camera, aspect)?;
     scene.light_from(&camera);
@@ -76,7 +77,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 struct Args {
-    model: PathBuf,
+    model: Option<PathBuf>,
+    triangles: u64,
     size: (u32, u32),
     camera: CameraOverrides,
     threads: usize,
@@ -86,13 +88,13 @@ struct Args {
 impl Args {
     fn parse() -> Result<Self, Box<dyn std::error::Error>> {
         let mut out = Self {
-            model: PathBuf::new(),
+            model: None,
+            triangles: 1_310_720,
             size: (1920, 1080),
             camera: CameraOverrides::default(),
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             rounds: 7,
         };
-        let mut triangles = 1_310_720;
         let mut args = std::env::args().skip(1).filter(|a| a != "--bench");
         while let Some(arg) = args.next() {
             let mut value = || args.next().ok_or(format!("{arg} needs a value"));
@@ -107,16 +109,22 @@ impl Args {
                 "--fov" => out.camera.projection = Some(Projection::Perspective { fov_deg: value()?.parse()? }),
                 "--threads" => out.threads = value()?.parse()?,
                 "--rounds" => out.rounds = value()?.parse()?,
-                "--triangles" => triangles = value()?.parse()?,
+                "--triangles" => out.triangles = value()?.parse()?,
                 flag if flag.starts_with('-') => return Err(format!("unknown flag {flag}").into()),
-                model => out.model = model.into(),
+                model => out.model = Some(model.into()),
             }
         }
-        if out.model.as_os_str().is_empty() {
-            out.model = std::env::temp_dir().join(format!("tison-bench-{triangles}.obj"));
-            scene::example::write_mesh(triangles, &mut std::fs::File::create(&out.model)?)?;
-        }
         Ok(out)
+    }
+
+    /// The model asked for, or a generated one.
+    fn model(&self) -> std::io::Result<PathBuf> {
+        if let Some(model) = &self.model {
+            return Ok(model.clone());
+        }
+        let path = std::env::temp_dir().join(format!("tison-bench-{}.obj", self.triangles));
+        scene::example::write_mesh(self.triangles, &mut std::fs::File::create(&path)?)?;
+        Ok(path)
     }
 }
 
