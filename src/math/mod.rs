@@ -1,0 +1,5 @@
+//! Floats and frames. Knows nothing of the rooms above.
+
+mod frame;
+
+pub use frame::Frame;
