@@ -191,10 +191,23 @@ impl RayQueue for RayHitPacket {
 
 /// Any number of rays, packed densely: ray `i` is lane `i % LANES` of packet `i / LANES`,
 /// and only the last packet may be partly filled. Kept and refilled, never reallocated.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct PacketBatch<P> {
     packets: Vec<P>,
     len: usize,
+}
+
+impl<P: RayQueue> Clone for PacketBatch<P> {
+    fn clone(&self) -> Self {
+        Self { packets: self.packets().to_vec(), len: self.len }
+    }
+
+    /// Copies the packets in use into memory that `self` already has.
+    fn clone_from(&mut self, from: &Self) {
+        self.resize(from.len);
+        let used = from.packets().len();
+        self.packets[..used].clone_from_slice(from.packets());
+    }
 }
 
 impl<P: RayQueue> Default for PacketBatch<P> {

@@ -1,5 +1,8 @@
-//! Floats and frames. Knows nothing of the rooms above.
+//! Floats, colour, samples. Knows nothing of rays or scenes.
 
+pub mod colour;
 mod frame;
+mod sampling;
 
 pub use frame::Frame;
+pub use sampling::{PixelSamples, concentric_disc};

@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn a_hundred_thousand_corners() {
-        let corners: Vec<_> = (0..100_000)
+        let corners: Vec<_> = (0..100_000u32)
             .map(|i| {
                 let (angle, radius) = (f64::from(i) * std::f64::consts::TAU / 1e5, [1.0, 0.7, 0.9][i as usize % 3]);
                 [(angle.cos() * radius) as f32, (angle.sin() * radius) as f32]
