@@ -36,6 +36,14 @@ impl ShearedRay {
         Self { o, axes: [x, y, z], shear, t_near, t_far }
     }
 
+    /// The axes of space that x, y and z of the sheared space are made of; z is the one
+    /// along which `d` is longest.
+    #[inline]
+    #[must_use]
+    pub fn axes(&self) -> [usize; 3] {
+        self.axes
+    }
+
     #[inline]
     fn project(&self, p: Vec3) -> DVec3 {
         let q = p.as_dvec3() - self.o;

@@ -1,0 +1,307 @@
+//! Builds the hierarchy from the top down: binned surface-area heuristic.
+//!
+//! Source: I. Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies",
+//! RT 2007; four children at once by splitting the largest of them again, as Embree does.
+//! Every decision depends on the triangles alone, so the tree is the same for any number
+//! of threads.
+
+use super::bins::{BINS, Binning, Bins, Box4, Item, Plane};
+use super::bvh::{Block, Bvh, Child, HEURISTIC_DEPTH, Node, WIDTH};
+use super::{BuildError, BuildOptions, Quality};
+use crate::geom::{BAD_FACE, TriangleMesh};
+use rayon::prelude::*;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Below this many triangles a subtree is built by one thread.
+const TASK: usize = 1 << 12;
+
+/// Above this many triangles they are counted into bins by several threads.
+const WIDE: usize = 1 << 16;
+
+/// Triangles that stay together, with the box around them and the one around their
+/// centroids.
+struct Group<'a> {
+    items: &'a mut [Item],
+    /// Place of the first item among all.
+    start: usize,
+    bounds: Box4,
+    centroids: Box4,
+}
+
+/// Triangles of one leaf among all items.
+#[derive(Clone, Copy)]
+struct LeafRange {
+    start: u32,
+    count: u32,
+}
+
+/// A finished subtree: node 0 is its root, leaves are numbered within it.
+#[derive(Default)]
+struct Subtree {
+    nodes: Vec<Node>,
+    leaves: Vec<LeafRange>,
+    depth: usize,
+}
+
+/// What a child of a node is while threads still work on subtrees.
+enum Part {
+    Leaf(LeafRange),
+    Done(Subtree),
+    Inner(Node, Vec<Part>),
+}
+
+struct Cancelled;
+
+struct Builder<'a> {
+    quality: Quality,
+    cancel: &'a AtomicBool,
+}
+
+/// Builds the hierarchy over all faces that can be hit; `first[g]` is the number of the
+/// first face of mesh `g`.
+pub(super) fn build(
+    meshes: &[Arc<TriangleMesh>],
+    first: &[u32],
+    options: &BuildOptions<'_>,
+) -> Result<Bvh, BuildError> {
+    let builder = Builder { quality: options.quality, cancel: options.cancel };
+    let mut items = items(meshes, first);
+    let tree = builder.tree(&mut items).map_err(|Cancelled| BuildError::Cancelled)?;
+    let block = |leaf: &LeafRange| {
+        let (start, count) = (leaf.start as usize, leaf.count as usize);
+        let mut block = Block::EMPTY;
+        for (lane, item) in items[start..start + count].iter().enumerate() {
+            let (geom, prim) = super::owner(first, item.id());
+            block.set(lane, meshes[geom as usize].triangle(prim), item.id());
+        }
+        block
+    };
+    let blocks = tree.leaves.par_iter().with_min_len(TASK).map(block).collect();
+    Ok(Bvh { nodes: tree.nodes, blocks, depth: tree.depth })
+}
+
+/// Boxes of all faces that can be hit, in the order of their numbers.
+fn items(meshes: &[Arc<TriangleMesh>], first: &[u32]) -> Vec<Item> {
+    let good = meshes.iter().map(|m| m.face_count() - m.faults().total()).sum();
+    let mut items = Vec::with_capacity(good);
+    for (mesh, &first) in meshes.iter().zip(first) {
+        items.par_extend(mesh.faces().par_iter().enumerate().with_min_len(TASK).filter_map(|(i, &face)| {
+            let prim = i as u32;
+            (face != BAD_FACE).then(|| Item::new(mesh.triangle(prim), first + prim))
+        }));
+    }
+    items
+}
+
+impl Builder<'_> {
+    fn tree(&self, items: &mut [Item]) -> Result<Subtree, Cancelled> {
+        if items.is_empty() {
+            return Ok(Subtree::default());
+        }
+        let root = Group::of(items);
+        let mut tree = Subtree::default();
+        if root.items.len() <= TASK {
+            self.subtree(root, 1, &mut tree)?;
+        } else {
+            tree.take(self.part(root, 1)?, 1);
+        }
+        Ok(tree)
+    }
+
+    /// Builds what is below a node at `depth`, large subtrees in parallel.
+    fn part(&self, group: Group<'_>, depth: usize) -> Result<Part, Cancelled> {
+        if group.is_leaf() {
+            return Ok(Part::Leaf(group.leaf()));
+        }
+        if group.items.len() <= TASK {
+            let mut tree = Subtree::default();
+            self.subtree(group, depth, &mut tree)?;
+            return Ok(Part::Done(tree));
+        }
+        self.check()?;
+        let children = self.children(group, depth);
+        let mut node = Node::EMPTY;
+        for (lane, child) in children.iter().enumerate() {
+            node.set_bounds(lane, child.bounds);
+        }
+        let parts: Result<Vec<_>, _> = children.into_par_iter().map(|c| self.part(c, depth + 1)).collect();
+        Ok(Part::Inner(node, parts?))
+    }
+
+    /// Builds a node for `group` and all below it, depth first.
+    fn subtree(&self, group: Group<'_>, depth: usize, out: &mut Subtree) -> Result<(), Cancelled> {
+        self.check()?;
+        let index = out.nodes.len();
+        out.nodes.push(Node::EMPTY);
+        out.depth = out.depth.max(depth);
+        let children = if group.is_leaf() { vec![group] } else { self.children(group, depth) };
+        for (lane, child) in children.into_iter().enumerate() {
+            out.nodes[index].set_bounds(lane, child.bounds);
+            out.nodes[index].child[lane] = if child.is_leaf() {
+                out.leaf(child.leaf())
+            } else {
+                let node = Child::node(out.nodes.len());
+                self.subtree(child, depth + 1, out)?;
+                node
+            };
+        }
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), Cancelled> {
+        if self.cancel.load(Ordering::Relaxed) { Err(Cancelled) } else { Ok(()) }
+    }
+
+    /// Splits the group with the largest box until there are four, or only leaves.
+    fn children<'a>(&self, group: Group<'a>, depth: usize) -> Vec<Group<'a>> {
+        let unit = group.bounds.unit();
+        let mut children = Vec::with_capacity(WIDTH);
+        children.push(group);
+        while children.len() < WIDTH {
+            let areas = children.iter().enumerate().filter(|(_, c)| !c.is_leaf());
+            let areas = areas.map(|(i, c)| (i, c.bounds.half_area(unit)));
+            let Some((largest, _)) = areas.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+                break;
+            };
+            let (left, right) = self.split(children.swap_remove(largest), depth);
+            children.push(left);
+            children.push(right);
+        }
+        children
+    }
+
+    /// Two groups, neither empty.
+    fn split<'a>(&self, group: Group<'a>, depth: usize) -> (Group<'a>, Group<'a>) {
+        if depth < HEURISTIC_DEPTH
+            && let Some(plane) = self.best_plane(&group)
+        {
+            return group.partition(&plane);
+        }
+        group.halve()
+    }
+
+    /// Where the surface-area heuristic splits; `None` where all centroids coincide.
+    fn best_plane(&self, group: &Group<'_>) -> Option<Plane> {
+        let bins = match self.quality {
+            Quality::Good => (4 + group.items.len() / 8).min(BINS),
+            Quality::Fast => 8,
+        };
+        let binning = Binning::new(group.centroids, bins);
+        let filled = if group.items.len() > WIDE {
+            let parts = group.items.par_chunks(TASK).with_min_len(4).map(|chunk| Bins::of(chunk, &binning));
+            parts.reduce(|| Bins::EMPTY, Bins::plus)
+        } else {
+            Bins::of(group.items, &binning)
+        };
+        filled.best(&binning, group.bounds.unit())
+    }
+}
+
+impl Subtree {
+    /// Appends a leaf and says how a node refers to it.
+    fn leaf(&mut self, leaf: LeafRange) -> Child {
+        self.leaves.push(leaf);
+        Child::leaf(self.leaves.len() - 1, leaf.count as usize)
+    }
+
+    /// Appends `part`, whose top is at `depth`, and says how a node refers to it.
+    fn take(&mut self, part: Part, depth: usize) -> Child {
+        let base = self.nodes.len();
+        match part {
+            Part::Leaf(leaf) => return self.leaf(leaf),
+            Part::Done(tree) => {
+                let blocks = self.leaves.len();
+                let moved = |n: Node| Node { child: n.child.map(|c| c.moved(base, blocks)), ..n };
+                self.nodes.extend(tree.nodes.into_iter().map(moved));
+                self.leaves.extend(tree.leaves);
+                self.depth = self.depth.max(tree.depth);
+            }
+            Part::Inner(node, parts) => {
+                self.nodes.push(node);
+                self.depth = self.depth.max(depth);
+                for (lane, part) in parts.into_iter().enumerate() {
+                    self.nodes[base].child[lane] = self.take(part, depth + 1);
+                }
+            }
+        }
+        Child::node(base)
+    }
+}
+
+impl<'a> Group<'a> {
+    /// All items.
+    fn of(items: &'a mut [Item]) -> Self {
+        let (bounds, centroids) = items
+            .par_chunks(TASK)
+            .map(|chunk| {
+                let mut boxes = (Box4::EMPTY, Box4::EMPTY);
+                for item in chunk {
+                    boxes.0.grow(item.lo(), item.hi);
+                    boxes.1.grow(item.centroid(), item.centroid());
+                }
+                boxes
+            })
+            .reduce(|| (Box4::EMPTY, Box4::EMPTY), |a, b| (a.0.union(b.0), a.1.union(b.1)));
+        Self { items, start: 0, bounds, centroids }
+    }
+
+    fn is_leaf(&self) -> bool {
+        self.items.len() <= WIDTH
+    }
+
+    fn leaf(&self) -> LeafRange {
+        LeafRange { start: self.start as u32, count: self.items.len() as u32 }
+    }
+
+    /// Sorts the items to the two sides of `plane`.
+    fn partition(self, plane: &Plane) -> (Self, Self) {
+        let items = self.items;
+        let mut left = (Box4::EMPTY, Box4::EMPTY);
+        let mut right = left;
+        let (mut i, mut j) = (0, items.len());
+        while i < j {
+            let item = items[i];
+            let c = item.centroid();
+            let side = if plane.is_left(c) {
+                i += 1;
+                &mut left
+            } else {
+                j -= 1;
+                items.swap(i, j);
+                &mut right
+            };
+            side.0.grow(item.lo(), item.hi);
+            side.1.grow(c, c);
+        }
+        let (a, b) = items.split_at_mut(i);
+        let (start, mid) = (self.start, self.start + i);
+        (
+            Self { items: a, start, bounds: left.0, centroids: left.1 },
+            Self { items: b, start: mid, bounds: right.0, centroids: right.1 },
+        )
+    }
+
+    /// Two halves by the order of centroids along the longest axis.
+    fn halve(self) -> (Self, Self) {
+        let e = self.centroids.size();
+        let axis = if e.x >= e.y && e.x >= e.z {
+            0
+        } else if e.y >= e.z {
+            1
+        } else {
+            2
+        };
+        let mid = self.items.len() / 2;
+        let key = |item: &Item| (item.centroid()[axis], item.id());
+        self.items.select_nth_unstable_by(mid, |a, b| {
+            let (a, b) = (key(a), key(b));
+            a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
+        });
+        let (a, b) = self.items.split_at_mut(mid);
+        let (mut left, mut right) = (Group::of(a), Group::of(b));
+        left.start = self.start;
+        right.start = self.start + mid;
+        (left, right)
+    }
+}

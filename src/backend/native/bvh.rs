@@ -1,0 +1,138 @@
+//! The hierarchy in memory: nodes of four boxes, leaves of up to four triangles.
+
+use super::bins::Box4;
+use glam::Vec4;
+
+/// Children of a node, and triangles of a leaf: the lanes of one SSE register.
+pub(super) const WIDTH: usize = 4;
+
+/// Most triangles of one hierarchy: in the worst case each has a leaf of its own, and a
+/// [`Child`] has 29 bits for the leaf (the last value is kept for [`Child::NONE`]).
+pub(super) const MAX_TRIANGLES: usize = (1 << 29) - 1;
+
+/// Most nodes on the way from the root to a leaf. The builder stops to follow the
+/// surface-area heuristic at [`HEURISTIC_DEPTH`] and halves what is left from there on:
+/// 2^29 triangles are at most 28 halvings away from leaves.
+pub(super) const MAX_DEPTH: usize = HEURISTIC_DEPTH + 28;
+
+/// See [`MAX_DEPTH`].
+pub(super) const HEURISTIC_DEPTH: usize = 56;
+
+/// What a child of a node is, in 32 bits: an inner node, a leaf with its number of
+/// triangles, or nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Child(u32);
+
+impl Child {
+    const LEAF: u32 = 1 << 31;
+    /// A child whose box no ray enters.
+    pub(super) const NONE: Self = Self(u32::MAX);
+
+    pub(super) fn node(index: usize) -> Self {
+        debug_assert!(index < Self::LEAF as usize);
+        Self(index as u32)
+    }
+
+    pub(super) fn leaf(block: usize, count: usize) -> Self {
+        debug_assert!(block < MAX_TRIANGLES && (1..=WIDTH).contains(&count));
+        Self(Self::LEAF | (block as u32) << 2 | (count as u32 - 1))
+    }
+
+    #[inline]
+    pub(super) fn is_leaf(self) -> bool {
+        self.0 & Self::LEAF != 0
+    }
+
+    /// Index of the node, where it is one.
+    #[inline]
+    pub(super) fn node_index(self) -> usize {
+        self.0 as usize
+    }
+
+    /// Index of the block, where it is a leaf.
+    #[inline]
+    pub(super) fn block_index(self) -> usize {
+        ((self.0 & !Self::LEAF) >> 2) as usize
+    }
+
+    /// Bits of the lanes of the block that hold a triangle, where it is a leaf.
+    #[inline]
+    pub(super) fn lanes(self) -> u32 {
+        0b1111 >> (3 - (self.0 & 3))
+    }
+
+    /// The same child where nodes and blocks have moved up by these numbers.
+    pub(super) fn moved(self, nodes: usize, blocks: usize) -> Self {
+        if self == Self::NONE {
+            self
+        } else if self.is_leaf() {
+            Self(self.0 + ((blocks as u32) << 2))
+        } else {
+            Self(self.0 + nodes as u32)
+        }
+    }
+}
+
+/// Four boxes side by side and what is in them.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Node {
+    /// `bounds[axis][0]` is the low side of the four boxes, `bounds[axis][1]` the high one.
+    pub(super) bounds: [[Vec4; 2]; 3],
+    pub(super) child: [Child; WIDTH],
+}
+
+impl Node {
+    /// A node without children: every lane's box is inside out.
+    pub(super) const EMPTY: Self =
+        Self { bounds: [[Vec4::INFINITY, Vec4::NEG_INFINITY]; 3], child: [Child::NONE; WIDTH] };
+
+    /// Puts the box of a child into `lane`, a little wider than it is.
+    pub(super) fn set_bounds(&mut self, lane: usize, bounds: Box4) {
+        let Box4 { lo, hi } = bounds.padded();
+        for axis in 0..3 {
+            self.bounds[axis][0][lane] = lo[axis];
+            self.bounds[axis][1][lane] = hi[axis];
+        }
+    }
+}
+
+/// Up to four triangles side by side. The corners are copied here: a test needs no
+/// index, and the lanes are what the f32 filter reads.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub(super) struct Block {
+    /// `corners[k][axis]`: coordinate `axis` of corner `k` of the four triangles.
+    pub(super) corners: [[Vec4; 3]; 3],
+    /// Number of each triangle, counted through all meshes.
+    pub(super) id: [u32; WIDTH],
+}
+
+impl Block {
+    pub(super) const EMPTY: Self = Self { corners: [[Vec4::ZERO; 3]; 3], id: [u32::MAX; WIDTH] };
+
+    /// Puts a triangle into `lane`.
+    pub(super) fn set(&mut self, lane: usize, corners: [glam::Vec3; 3], id: u32) {
+        for (to, from) in self.corners.iter_mut().zip(corners) {
+            for axis in 0..3 {
+                to[axis][lane] = from[axis];
+            }
+        }
+        self.id[lane] = id;
+    }
+
+    /// Corners of the triangle in `lane`.
+    #[inline]
+    pub(super) fn triangle(&self, lane: usize) -> [glam::Vec3; 3] {
+        self.corners.map(|c| glam::Vec3::new(c[0][lane], c[1][lane], c[2][lane]))
+    }
+}
+
+/// A whole hierarchy; node 0 is the root. No nodes: no triangles.
+#[derive(Debug, Default)]
+pub(super) struct Bvh {
+    pub(super) nodes: Vec<Node>,
+    pub(super) blocks: Vec<Block>,
+    /// Nodes on the longest way from the root to a leaf.
+    pub(super) depth: usize,
+}

@@ -1,0 +1,117 @@
+//! The pure-Rust tracer: a hierarchy of its own, and a triangle test that decides in f64.
+//!
+//! | part | job |
+//! |---|---|
+//! | `build`, `bins` | the hierarchy from the triangles, in parallel |
+//! | `bvh` | the hierarchy in memory |
+//! | `ray` | a ray prepared for boxes and triangles |
+//! | `traverse` | the way of a ray through the hierarchy |
+//!
+//! What a ray meets is decided by [`triangle::intersect`](crate::geom::triangle::intersect)
+//! alone. Boxes and the f32 filter before it only skip triangles that it would turn away,
+//! with their own rounding accounted for, so that the answer is that of a loop over all
+//! triangles: the least `t`, and among equal ones the lowest `(geom_id, prim_id)`.
+
+mod bins;
+mod build;
+mod bvh;
+mod ray;
+mod traverse;
+
+use super::Backend;
+use crate::geom::{Hit, Ray, TriangleMesh};
+use bvh::{Bvh, MAX_TRIANGLES};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// How much time the hierarchy is worth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Quality {
+    /// Built sooner, slower to trace: for fewer than about ten rays per triangle.
+    Fast,
+    /// The surface-area heuristic throughout.
+    #[default]
+    Good,
+}
+
+/// How to build.
+#[derive(Clone, Copy, Debug)]
+pub struct BuildOptions<'a> {
+    /// Build time against trace time. The answers are the same.
+    pub quality: Quality,
+    /// Once true, the build stops within milliseconds.
+    pub cancel: &'a AtomicBool,
+}
+
+/// Why there is no hierarchy.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BuildError {
+    /// [`BuildOptions::cancel`] was set.
+    #[error("building the hierarchy was cancelled")]
+    Cancelled,
+    /// More triangles than it can number.
+    #[error("{count} triangles in one scene are more than the native backend can number ({MAX_TRIANGLES})")]
+    TooManyTriangles {
+        /// Faces of all meshes.
+        count: usize,
+    },
+}
+
+/// A frozen scene of triangle meshes, traced without Embree.
+#[derive(Debug)]
+pub struct Native {
+    bvh: Bvh,
+    /// Number of the first face of each mesh: faces are counted through all meshes.
+    first: Vec<u32>,
+}
+
+impl Native {
+    /// Builds one hierarchy over all `meshes` on the current rayon pool.
+    ///
+    /// `geom_id` of a hit is the index in `meshes`, `prim_id` the face's. The corners are
+    /// copied: the meshes are not kept. The tree is the same for any number of threads.
+    ///
+    /// # Errors
+    /// If it was cancelled, or there are 2^29 triangles and more.
+    pub fn build(meshes: &[Arc<TriangleMesh>], options: &BuildOptions<'_>) -> Result<Self, BuildError> {
+        let count = meshes.iter().map(|m| m.face_count()).sum();
+        if count > MAX_TRIANGLES {
+            return Err(BuildError::TooManyTriangles { count });
+        }
+        let first: Vec<u32> = meshes
+            .iter()
+            .scan(0, |next, mesh| {
+                let first = *next;
+                *next += mesh.face_count() as u32;
+                Some(first)
+            })
+            .collect();
+        let bvh = build::build(meshes, &first, options)?;
+        Ok(Self { bvh, first })
+    }
+
+    /// Bytes of the hierarchy with its copy of the triangles.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.bvh.nodes[..]) + size_of_val(&self.bvh.blocks[..]) + size_of_val(&self.first[..])
+    }
+}
+
+/// `(geom_id, prim_id)` of the face with number `id`.
+fn owner(first: &[u32], id: u32) -> (u32, u32) {
+    let geom = first.partition_point(|&f| f <= id) - 1;
+    (geom as u32, id - first[geom])
+}
+
+impl Backend for Native {
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        let found = self.bvh.nearest(ray)?;
+        let (geom_id, prim_id) = owner(&self.first, found.id);
+        Some(Hit { t: found.t, u: found.u, v: found.v, ng: found.ng, prim_id, geom_id })
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.bvh.any(ray)
+    }
+}

@@ -1,0 +1,138 @@
+//! A ray prepared once for boxes and triangles, four at a time.
+
+use super::bvh::{Block, Node};
+use crate::geom::Ray;
+use crate::geom::triangle::ShearedRay;
+use glam::{DVec3, Vec4};
+
+/// What box tests may be off by, as a factor: a difference, a reciprocal and a product are
+/// three roundings of 2^-24 at each end of the interval, 2^-20 is above both together.
+///
+/// Source: T. Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013.
+const SLACK: f32 = 1.0 + 1.0 / (1 << 20) as f32;
+
+/// A ray as boxes see it.
+///
+/// Its `t` counts in units of a power of two times the direction's length, so that no
+/// direction is too long or too short for f32.
+pub(super) struct BoxRay {
+    o: [Vec4; 3],
+    inv_d: [Vec4; 3],
+    /// Per axis, which side of a box the ray meets first.
+    near: [usize; 3],
+    t_near: Vec4,
+    /// The `t` of boxes is `unit` times the ray's own.
+    unit: f64,
+}
+
+/// A ray as triangles see it.
+pub(super) struct TriangleRay {
+    /// For the test in f64. Its interval holds the `t` whose f32 lies in the ray's.
+    pub(super) exact: ShearedRay,
+    axes: [usize; 3],
+    o: [Vec4; 3],
+    shear: [Vec4; 2],
+}
+
+/// Prepares `ray`; `None` where it has no direction or is not finite, and meets nothing.
+pub(super) fn prepare(ray: &Ray) -> Option<(BoxRay, TriangleRay)> {
+    let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
+    let longest = d.abs().max_element();
+    if !(o.is_finite() && d.is_finite() && longest > 0.0) {
+        return None;
+    }
+    // The power of two at or below the largest component: scaling by it is exact.
+    let unit = f64::from_bits(longest.to_bits() & (0x7ff << 52));
+    let (t_near, t_far) = interval(ray);
+    let exact = ShearedRay::new(o, d, t_near, t_far);
+    Some((BoxRay::new(ray, d / unit, unit), TriangleRay::new(ray, d, exact)))
+}
+
+/// All `t` that lie between `t_near` and `t_far` once they are rounded to f32.
+///
+/// A hit is so inside the open interval as the caller sees it, and a ray that goes on
+/// from the `t` of a hit does not meet it again.
+fn interval(ray: &Ray) -> (f64, f64) {
+    let middle = |a: f32, b: f32| 0.5 * f64::from(a) + 0.5 * f64::from(b);
+    (middle(ray.t_near, ray.t_near.next_up()), middle(ray.t_far.next_down(), ray.t_far))
+}
+
+impl BoxRay {
+    /// `d` is the ray's direction divided by `unit`.
+    fn new(ray: &Ray, d: DVec3, unit: f64) -> Self {
+        // Infinite where the ray is parallel to the sides. A box side through the origin
+        // then gives NaN, and lanes with NaN may turn out either way: boxes are wider than
+        // what is in them, so an origin on a side is outside of that.
+        let inv_d = [0, 1, 2].map(|axis| (1.0 / d[axis]) as f32);
+        Self {
+            o: ray.o.to_array().map(Vec4::splat),
+            inv_d: inv_d.map(Vec4::splat),
+            near: inv_d.map(|i| usize::from(i.is_sign_negative())),
+            t_near: Vec4::splat(((f64::from(ray.t_near) * unit) as f32).next_down()),
+            unit,
+        }
+    }
+
+    /// The `t` from where on no box matters once there is a hit at `t`.
+    #[inline]
+    pub(super) fn cull(&self, t: f64) -> f32 {
+        (t * self.unit) as f32 * SLACK + f32::MIN_POSITIVE
+    }
+
+    /// Bits of the children whose boxes the ray meets up to `cull`, and where it enters them.
+    #[inline]
+    pub(super) fn enter(&self, node: &Node, cull: f32) -> (u32, [f32; 4]) {
+        let side = |axis: usize, side: usize| (node.bounds[axis][side & 1] - self.o[axis]) * self.inv_d[axis];
+        let [x, y, z] = self.near;
+        let enter = side(0, x).max(side(1, y)).max(side(2, z).max(self.t_near));
+        let leave = side(0, 1 - x).min(side(1, 1 - y)).min(side(2, 1 - z)) * SLACK;
+        let hit = enter.cmple(leave.min(Vec4::splat(cull)));
+        (hit.bitmask(), enter.to_array())
+    }
+}
+
+impl TriangleRay {
+    fn new(ray: &Ray, d: DVec3, exact: ShearedRay) -> Self {
+        let axes = exact.axes();
+        let [x, y, z] = axes;
+        Self {
+            exact,
+            axes,
+            o: axes.map(|axis| Vec4::splat(ray.o[axis])),
+            shear: [d[x] / d[z], d[y] / d[z]].map(|s| Vec4::splat(s as f32)),
+        }
+    }
+
+    /// Bits of the lanes of `block` that the ray's line may meet: all that the f64 test
+    /// would not turn away for its edge functions, and some more.
+    ///
+    /// The same edge functions in f32, with a bound of their error. With e = 2^-24, s the
+    /// largest sheared coordinate and z the largest distance along the ray's main axis:
+    /// a sheared coordinate is off by less than d = 8e (s + z) (one rounding of a
+    /// difference not above s + z, three of a product not above z, one of the result), an
+    /// edge function by less than 4 d s + 2 d^2 + 4e s^2 <= 5 d (s + d), to which the
+    /// smallest normal float is added for products that vanish. Where a bound overflows
+    /// nothing is turned away.
+    #[inline]
+    pub(super) fn candidates(&self, block: &Block) -> u32 {
+        let [x, y, z] = self.axes;
+        let project = |corner: &[Vec4; 3]| {
+            let along = corner[z] - self.o[2];
+            let a = corner[x] - self.o[0] - self.shear[0] * along;
+            let b = corner[y] - self.o[1] - self.shear[1] * along;
+            (a, b, along.abs(), a.abs().max(b.abs()))
+        };
+        let (ax, ay, az, a) = project(&block.corners[0]);
+        let (bx, by, bz, b) = project(&block.corners[1]);
+        let (cx, cy, cz, c) = project(&block.corners[2]);
+        let u = cx * by - cy * bx;
+        let v = ax * cy - ay * cx;
+        let w = bx * ay - by * ax;
+        let s = a.max(b).max(c);
+        let d = (s + az.max(bz).max(cz)) * (8.0 / (1 << 24) as f32);
+        let bound = d * (s + d) * 6.0 + f32::MIN_POSITIVE;
+        let least = u.min(v).min(w);
+        let most = u.max(v).max(w);
+        !((least.cmplt(-bound)) & (most.cmpgt(bound))).bitmask() & 0b1111
+    }
+}
