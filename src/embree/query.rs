@@ -138,7 +138,8 @@ impl Scene {
         let mut query = c_ray(ray);
         // SAFETY: as for `intersect_plain`.
         unsafe { sys::rtcOccluded1(self.raw(), &mut query, ptr::null_mut()) };
-        query.tfar == f32::NEG_INFINITY
+        // Minus infinity where something is in the way; a ray with an empty interval may have that from the start.
+        query.tfar < ray.t_far
     }
 
     #[inline]

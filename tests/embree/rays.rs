@@ -242,6 +242,28 @@ fn rays_that_cannot_hit_miss_and_leave_their_neighbours_alone() {
 }
 
 #[test]
+fn a_lane_that_asks_nothing_gets_no_answer() {
+    let scene = build(&device(), blob(24), SceneOptions::default());
+    let honest = Ray::new(Vec3::new(5.0, 0.1, 0.2), -Vec3::X);
+    for silent in
+        [Ray { t_far: f32::NEG_INFINITY, ..honest }, Ray { d: Vec3::ZERO, t_far: f32::NEG_INFINITY, ..honest }]
+    {
+        assert_eq!(scene.intersect(&silent), None);
+        assert!(!scene.occluded(&silent));
+        let mut packet = RayHitPacket::<16>::EMPTY;
+        (0..16).for_each(|lane| packet.ray.set(lane, if lane % 3 == 0 { &silent } else { &honest }));
+        let mut shadow = packet.ray.clone();
+        scene.intersect_packet(&mut packet, 16, Coherence::Coherent);
+        scene.occluded_packet(&mut shadow, 16, Coherence::Coherent);
+        for lane in 0..16 {
+            assert_eq!(packet.hit(lane).is_some(), lane % 3 != 0);
+            assert_eq!(packet.ray.t_far[lane] == f32::NEG_INFINITY, lane % 3 == 0);
+            assert_eq!(shadow.t_far[lane], f32::NEG_INFINITY);
+        }
+    }
+}
+
+#[test]
 fn many_threads_may_ask_one_scene() {
     let scene = build(&device(), blob(60), SceneOptions::default());
     let rays = rays(4000);
