@@ -113,8 +113,7 @@ fn point() -> impl Strategy<Value = Vec3> + Clone {
 
 /// One in four is a sliver: two corners close together.
 fn triangles(p: impl Strategy<Value = Vec3> + Clone) -> impl Strategy<Value = Vec<[Vec3; 3]>> {
-    let sliver =
-        (p.clone(), p.clone(), point(), -6i32..-1).prop_map(|(a, b, e, k)| [a, b, b + e * 10f32.powi(k)]);
+    let sliver = (p.clone(), p.clone(), point(), -6i32..-1).prop_map(|(a, b, e, k)| [a, b, b + e * 10f32.powi(k)]);
     proptest::collection::vec(prop_oneof![3 => [p.clone(), p.clone(), p], 1 => sliver], 1..60)
 }
 

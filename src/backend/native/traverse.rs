@@ -2,8 +2,8 @@
 
 use super::bvh::{Bvh, Child, MAX_DEPTH, WIDTH};
 use super::ray::{BoxRay, TriangleRay, prepare};
-use crate::geom::triangle::{self, TriangleHit};
 use crate::geom::Ray;
+use crate::geom::triangle::{self, TriangleHit};
 use glam::{DVec3, Vec3};
 
 /// Children waiting on the way down: all but one of each node.
