@@ -3,7 +3,6 @@
 
 use glam::Vec3;
 use proptest::prelude::*;
-use rayon::ThreadPoolBuilder;
 use std::collections::HashMap;
 use std::f32::consts::TAU;
 use std::sync::Arc;
@@ -113,8 +112,7 @@ fn point() -> impl Strategy<Value = Vec3> + Clone {
 
 /// One in four is a sliver: two corners close together.
 fn triangles(p: impl Strategy<Value = Vec3> + Clone) -> impl Strategy<Value = Vec<[Vec3; 3]>> {
-    let sliver =
-        (p.clone(), p.clone(), point(), -6i32..-1).prop_map(|(a, b, e, k)| [a, b, b + e * 10f32.powi(k)]);
+    let sliver = (p.clone(), p.clone(), point(), -6i32..-1).prop_map(|(a, b, e, k)| [a, b, b + e * 10f32.powi(k)]);
     proptest::collection::vec(prop_oneof![3 => [p.clone(), p.clone(), p], 1 => sliver], 1..60)
 }
 
@@ -445,19 +443,36 @@ fn rays_that_are_none_meet_nothing() {
 
 // ---- batches and builds ----
 
+/// Batches of all sorts: coherent and not, from one point and to one point, in all eight
+/// octants, with intervals that end before, at and behind the mesh.
+fn batches(numbers: &mut Numbers, points: &[Vec3]) -> Vec<Vec<Ray>> {
+    let mut batches = Vec::new();
+    for octant in (0..8).map(|s| Vec3::from([0, 1, 2].map(|axis| 1.0 - 2.0 * (s >> axis & 1) as f32))) {
+        let (eye, to) = (octant * Vec3::new(2.0, 3.0, 4.0), |p: Vec3| Vec3::new(p.y, p.z, p.x));
+        let pixel = |i: i32| Vec3::new((i % 32) as f32, (i / 32) as f32, 0.0) / 16.0 - 1.0;
+        batches.push((0..1024).map(|i| Ray::new(eye, octant * pixel(i) - eye)).collect());
+        batches.push((0..1024).map(|i| Ray::segment(eye, to(octant * pixel(i)) - eye, 0.9)).collect());
+        // From the surface to a light: origins differ, and some lie far apart.
+        batches.push(points.iter().take(1003).map(|&p| Ray::segment(p * 1.001, eye - p, 1.0)).collect());
+        batches.push((0..512).map(|i| Ray::new(eye + 0.5 * pixel(i), -eye)).collect());
+    }
+    let mut scattered = || Ray::segment(numbers.point() * 2.0, numbers.direction(), 4.0 * numbers.next());
+    batches.push((0..1003).map(|_| scattered()).collect());
+    // Some that are none, among coherent ones.
+    let broken = |i: i32| if i % 37 == 5 { Vec3::ZERO } else { Vec3::new(1.0, 0.1, 0.01 * i as f32) };
+    batches.push((0..128).map(|i| Ray { d: broken(i), ..Ray::new(Vec3::ZERO, Vec3::X) }).collect());
+    batches.push((0..128).map(|i| Ray::new(Vec3::ZERO, Vec3::new(1.0, 0.0, 0.01 * i as f32))).collect());
+    batches
+}
+
 #[test]
 fn batches_answer_like_single_rays() {
-    let (points, faces) = ball(30, bumpy);
+    let (points, faces) = ball(30, |d| bumpy(d) + 0.2 * (31.0 * d.x).sin());
     let native = built(&[mesh(&points, faces)], Quality::Good);
-    let mut numbers = Numbers(21);
-    let scattered: Vec<Ray> =
-        (0..1003).map(|_| Ray::segment(numbers.point() * 2.0, numbers.direction(), 4.0 * numbers.next())).collect();
-    let pixel = |i: i32| Vec3::new((i % 64) as f32 / 64.0 - 0.5, (i / 64) as f32 / 64.0 - 0.5, -1.0);
-    let bundle: Vec<Ray> = (0..4096 + 5).map(|i| Ray::new(Vec3::new(0.2, 0.1, 3.0), 0.8 * pixel(i))).collect();
-    for (rays, coherence) in [(&scattered, Coherence::Incoherent), (&bundle, Coherence::Coherent)]
-        .into_iter()
-        .chain([(&scattered, Coherence::Coherent), (&bundle, Coherence::Incoherent)])
-    {
+    let nothing = built(&[], Quality::Good);
+    let batches = batches(&mut Numbers(21), &points);
+    let cases = batches.iter().flat_map(|b| [Coherence::Coherent, Coherence::Incoherent].map(|c| (b, c)));
+    for ((rays, coherence), native) in cases.flat_map(|c| [(c, &native), (c, &nothing)]) {
         let (mut nearest, mut any) = (PacketBatch::<RayHitPacket>::default(), PacketBatch::<RayPacket>::default());
         for ray in rays {
             nearest.push(ray);
@@ -470,19 +485,6 @@ fn batches_answer_like_single_rays() {
             assert_eq!(nearest.packets()[i / 16].hit(i % 16), want, "ray {i}, {coherence:?}");
             assert_eq!(any.packets()[i / 16].is_occluded(i % 16), want.is_some(), "ray {i}, {coherence:?}");
         }
-    }
-}
-
-#[test]
-fn the_tree_is_the_same_for_any_number_of_threads() {
-    let (points, faces) = ball(110, bumpy);
-    let meshes = [mesh(&points, faces)];
-    for quality in [Quality::Good, Quality::Fast] {
-        let [one, two, seven] = [1, 2, 7].map(|threads| {
-            let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-            format!("{:?}", pool.install(|| built(&meshes, quality)))
-        });
-        assert!(one == two && one == seven, "{quality:?}");
     }
 }
 

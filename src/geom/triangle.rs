@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3};
 /// sheared onto z. Made once per ray, used for every triangle.
 #[derive(Clone, Copy, Debug)]
 pub struct ShearedRay {
+    /// Origin in the order of `axes`.
     o: DVec3,
     axes: [usize; 3],
     shear: DVec3,
@@ -33,7 +34,7 @@ impl ShearedRay {
             core::mem::swap(&mut x, &mut y); // keeps the winding
         }
         let shear = DVec3::new(d[x] / d[z], d[y] / d[z], 1.0 / d[z]);
-        Self { o, axes: [x, y, z], shear, t_near, t_far }
+        Self { o: DVec3::new(o[x], o[y], o[z]), axes: [x, y, z], shear, t_near, t_far }
     }
 
     /// The axes of space that x, y and z of the sheared space are made of; z is the one
@@ -44,11 +45,18 @@ impl ShearedRay {
         self.axes
     }
 
+    /// How far sheared x and y move per step along z; neither is above 1.
+    #[inline]
+    #[must_use]
+    pub fn shear(&self) -> [f64; 2] {
+        [self.shear.x, self.shear.y]
+    }
+
+    /// `p` has its coordinates in the order of `axes`.
     #[inline]
     fn project(&self, p: Vec3) -> DVec3 {
         let q = p.as_dvec3() - self.o;
-        let [x, y, z] = self.axes;
-        DVec3::new(q[x] - self.shear.x * q[z], q[y] - self.shear.y * q[z], self.shear.z * q[z])
+        DVec3::new(q.x - self.shear.x * q.z, q.y - self.shear.y * q.z, self.shear.z * q.z)
     }
 }
 
@@ -78,6 +86,15 @@ pub struct TriangleHit {
 #[inline]
 #[must_use]
 pub fn intersect(ray: &ShearedRay, p: [Vec3; 3]) -> Option<TriangleHit> {
+    let [x, y, z] = ray.axes;
+    intersect_permuted(ray, p.map(|q| Vec3::new(q[x], q[y], q[z])))
+}
+
+/// As [`intersect`], for corners that have their coordinates in the order of
+/// [`ShearedRay::axes`].
+#[inline]
+#[must_use]
+pub fn intersect_permuted(ray: &ShearedRay, p: [Vec3; 3]) -> Option<TriangleHit> {
     let [a, b, c] = p.map(|q| ray.project(q));
     let u = c.x * b.y - c.y * b.x;
     let v = a.x * c.y - a.y * c.x;
