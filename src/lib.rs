@@ -13,8 +13,8 @@
 //! | [`geom`] | rays, hits, packets, primitives |
 //! | [`math`] | floats, colour, samples |
 //!
-//! `embree` holds the safe wrapper of the C library; it and the crate `embree4-sys` are
-//! the only places with `unsafe`.
+//! `embree` holds the safe wrapper of the C library; it, the crate `embree4-sys` and the
+//! run-time choice of vector instructions in [`simd`] are the only places with `unsafe`.
 //!
 //! # The way of one ray
 //!
@@ -33,3 +33,5 @@ pub mod geom;
 pub mod math;
 pub mod render;
 pub mod scene;
+#[allow(unsafe_code, reason = "calling a function compiled for instructions that were looked for first")]
+pub mod simd;

@@ -1,8 +1,11 @@
 //! The seam between "what is hit" and "what it looks like".
 
+mod any;
 #[cfg(feature = "embree")]
 pub mod embree;
 pub mod native;
+
+pub use any::{AnyBackend, BackendKind, BuildOptions, Error};
 
 use crate::geom::{Coherence, Hit, PacketBatch, Ray, RayHitPacket, RayPacket};
 

@@ -191,10 +191,23 @@ impl RayQueue for RayHitPacket {
 
 /// Any number of rays, packed densely: ray `i` is lane `i % LANES` of packet `i / LANES`,
 /// and only the last packet may be partly filled. Kept and refilled, never reallocated.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct PacketBatch<P> {
     packets: Vec<P>,
     len: usize,
+}
+
+impl<P: RayQueue> Clone for PacketBatch<P> {
+    fn clone(&self) -> Self {
+        Self { packets: self.packets().to_vec(), len: self.len }
+    }
+
+    /// Copies the packets in use into memory that `self` already has.
+    fn clone_from(&mut self, from: &Self) {
+        self.resize(from.len);
+        let used = from.packets().len();
+        self.packets[..used].clone_from_slice(from.packets());
+    }
 }
 
 impl<P: RayQueue> Default for PacketBatch<P> {
@@ -239,6 +252,27 @@ impl<P: RayQueue> PacketBatch<P> {
         }
         self.packets[packet].rays().set(lane, ray);
         self.len += 1;
+    }
+
+    /// Appends a whole packet for the caller to fill. A lane that asks nothing has a `t_far`
+    /// of minus infinity, and keeps it.
+    ///
+    /// # Panics
+    /// If the last packet is not full.
+    #[inline]
+    pub fn push_packet(&mut self) -> &mut P {
+        assert_eq!(self.len % LANES, 0, "a packet cannot follow a partly filled one");
+        let packet = self.len / LANES;
+        if packet == self.packets.len() {
+            self.packets.push(P::EMPTY);
+        }
+        self.len += LANES;
+        &mut self.packets[packet]
+    }
+
+    /// Takes back the last packet.
+    pub fn pop_packet(&mut self) {
+        self.len = self.len.saturating_sub(1) / LANES * LANES;
     }
 
     /// The packets in use.

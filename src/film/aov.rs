@@ -1,0 +1,64 @@
+//! Auxiliary images ("arbitrary output variables"): what else a hit knows.
+
+/// What an auxiliary image shows of the first hit of a pixel's samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Aov {
+    /// Mean distance from the ray's start in world units over the samples that hit;
+    /// infinity where none did.
+    Depth,
+    /// Mean unit shading normal in world axes, facing the camera; zero where nothing was hit.
+    Normal,
+    /// Mean diffuse colour, linear RGB.
+    Albedo,
+    /// Object and primitive of the first sample, each plus one; zero where it hit nothing.
+    Id,
+    /// Share of the samples that hit something, 0 to 1.
+    Hits,
+    /// Rays traced for the pixel, of all kinds.
+    Cost,
+}
+
+impl Aov {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::Depth, Self::Normal, Self::Albedo, Self::Id, Self::Hits, Self::Cost];
+
+    /// The name on the command line and in file names.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Depth => "depth",
+            Self::Normal => "normal",
+            Self::Albedo => "albedo",
+            Self::Id => "id",
+            Self::Hits => "hits",
+            Self::Cost => "cost",
+        }
+    }
+
+    /// Floats per pixel.
+    #[must_use]
+    pub fn channels(self) -> usize {
+        match self {
+            Self::Depth | Self::Hits | Self::Cost => 1,
+            Self::Id => 2,
+            Self::Normal | Self::Albedo => 3,
+        }
+    }
+}
+
+/// One auxiliary image, row by row from the top, `kind.channels()` floats a pixel.
+#[derive(Clone, Debug)]
+pub struct AovImage {
+    /// What it shows.
+    pub kind: Aov,
+    /// The values.
+    pub data: Vec<f32>,
+}
+
+impl AovImage {
+    /// All zero.
+    #[must_use]
+    pub fn new(kind: Aov, pixels: usize) -> Self {
+        Self { kind, data: vec![0.0; pixels * kind.channels()] }
+    }
+}

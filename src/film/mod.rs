@@ -1,0 +1,49 @@
+//! Finished pixels and the files they go to. Knows `math` and nothing else.
+
+mod aov;
+
+pub use aov::{Aov, AovImage};
+
+/// A rendered image: linear colour and whatever else was asked for, row by row from the top.
+#[derive(Clone, Debug)]
+pub struct Film {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Linear RGB, mean of the samples of each pixel; finite.
+    pub color: Vec<[f32; 3]>,
+    /// Auxiliary images, in the order asked for.
+    pub aovs: Vec<AovImage>,
+    /// Pixels that were finished: less than `width * height` after an interruption; the
+    /// others are black.
+    pub finished: usize,
+}
+
+impl Film {
+    /// A black image with room for `aovs`.
+    #[must_use]
+    pub fn new(width: u32, height: u32, aovs: &[Aov]) -> Self {
+        let pixels = width as usize * height as usize;
+        Self {
+            width,
+            height,
+            color: vec![[0.0; 3]; pixels],
+            aovs: aovs.iter().map(|&kind| AovImage::new(kind, pixels)).collect(),
+            finished: 0,
+        }
+    }
+
+    /// Bytes a film of this size takes, for refusing one before it is made.
+    #[must_use]
+    pub fn bytes(width: u64, height: u64, aovs: &[Aov]) -> u64 {
+        let floats: u64 = 3 + aovs.iter().map(|a| a.channels() as u64).sum::<u64>();
+        width.saturating_mul(height).saturating_mul(4 * floats)
+    }
+
+    /// Whether every pixel was finished.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.finished == self.color.len()
+    }
+}

@@ -1,0 +1,10 @@
+//! Floats, colour, samples. Knows nothing of rays or scenes.
+
+pub mod colour;
+mod frame;
+mod pow;
+mod sampling;
+
+pub use frame::Frame;
+pub use pow::pow01;
+pub use sampling::{PixelSamples, concentric_disc};

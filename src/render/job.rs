@@ -1,0 +1,100 @@
+//! What is to be rendered, how a run is watched and stopped, and what it tells afterwards.
+
+use crate::film::{Aov, Film};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+
+/// Pixels `x0 <= x < x1`, `y0 <= y < y1` of the whole image, counted from the top left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "said above")]
+pub struct Crop {
+    pub x0: u32,
+    pub y0: u32,
+    pub x1: u32,
+    pub y1: u32,
+}
+
+/// One image to render.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// Width and height of the whole image in pixels; the camera fits this.
+    pub size: (u32, u32),
+    /// The part to render; the film has just this part.
+    pub crop: Crop,
+    /// Samples per pixel, at least 1.
+    pub spp: u32,
+    /// Chooses the samples; the same seed gives the same bytes.
+    pub seed: u32,
+    /// Most reflections and refractions in a row.
+    pub k_max: u32,
+    /// A branch whose weight is below this in every channel is not traced.
+    pub min_weight: f32,
+    /// One sample a pixel goes through the exact centre, not through a point beside it.
+    pub centre: bool,
+    /// Auxiliary images to fill.
+    pub aovs: Vec<Aov>,
+}
+
+/// Shared with whoever watches a render: progress out, cancellation in.
+#[derive(Debug, Default)]
+pub struct Control {
+    /// Set to stop at the next tile.
+    pub cancel: AtomicBool,
+    /// Rays of all kinds so far.
+    pub rays: AtomicU64,
+    /// Pixels finished so far.
+    pub pixels: AtomicU64,
+}
+
+impl Control {
+    /// Whether somebody asked to stop.
+    #[must_use]
+    pub fn is_cancelled(&self) -> bool {
+        self.cancel.load(Relaxed)
+    }
+}
+
+/// Rays traced, by kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the kinds")]
+pub struct RayCounts {
+    pub camera: u64,
+    pub shadow: u64,
+    pub reflected: u64,
+    pub refracted: u64,
+}
+
+impl RayCounts {
+    /// All of them.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        self.camera + self.shadow + self.reflected + self.refracted
+    }
+}
+
+/// What a render did, what it left out, and how wrong that can have made it.
+#[derive(Clone, Debug, Default)]
+pub struct RenderStats {
+    /// Wall time of the render loop.
+    pub seconds: f64,
+    /// Rays traced.
+    pub rays: RayCounts,
+    /// Largest bound of any pixel on what branches below the weight cut or beyond `k_max` could add, linear.
+    pub cut_off_max: f64,
+    /// Mean of the same over all pixels.
+    pub cut_off_mean: f64,
+    /// Samples that came out NaN or infinite; they are left out of their pixel.
+    pub non_finite_samples: u64,
+    /// Shadow rays not sent because the light is behind the surface.
+    pub shadow_rays_facing_away: u64,
+    /// Branches below the weight cut.
+    pub branches_below_cut: u64,
+}
+
+/// An image and its story.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The pixels.
+    pub film: Film,
+    /// The figures.
+    pub stats: RenderStats,
+}

@@ -1,0 +1,268 @@
+//! From a frozen scene and a backend to a film: tiles, waves of rays, shading.
+
+mod block;
+mod certificate;
+mod explain;
+mod job;
+mod lights;
+pub mod optics;
+mod shade;
+mod surface;
+mod tile;
+mod wave;
+
+pub use explain::explain_pixel;
+pub use job::{Control, Crop, Job, Outcome, RayCounts, RenderStats};
+
+use crate::backend::{AnyBackend, Backend};
+use crate::film::{Aov, AovImage, Film};
+use crate::geom::{Coherence, LANES, PacketBatch, RayHitPacket};
+use crate::scene::{Camera, CameraDesc, Needs, Scene};
+use certificate::Radiance;
+use glam::{DVec3, Vec3};
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+use wave::{Tally, Waves};
+
+/// Renders on the current rayon pool. The same scene, job and backend give the same bytes,
+/// however many threads there are.
+///
+/// # Errors
+/// A sentence, if the camera cannot be used ([`CameraDesc::prepare`]).
+pub fn run(
+    scene: &Scene,
+    camera: &CameraDesc,
+    backend: &AnyBackend,
+    job: &Job,
+    control: &Control,
+) -> Result<Outcome, String> {
+    match backend {
+        #[cfg(feature = "embree")]
+        AnyBackend::Embree(b) => run_with(scene, camera, b, job, control),
+        AnyBackend::Native(b) => run_with(scene, camera, b, job, control),
+    }
+}
+
+/// As [`run`], for any implementation of the seam.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_with<B: Backend>(
+    scene: &Scene,
+    camera: &CameraDesc,
+    backend: &B,
+    job: &Job,
+    control: &Control,
+) -> Result<Outcome, String> {
+    let camera = camera.prepare(&scene.frame, job.size)?;
+    let needs = scene.needs();
+    let outcome = if needs.secondary_rays() {
+        Render::<B, true> { scene, camera, backend, job, control, needs }.all_tiles()
+    } else {
+        Render::<B, false> { scene, camera, backend, job, control, needs }.all_tiles()
+    };
+    Ok(outcome)
+}
+
+struct Render<'a, B, const SECONDARY: bool> {
+    scene: &'a Scene,
+    camera: Camera,
+    backend: &'a B,
+    job: &'a Job,
+    control: &'a Control,
+    needs: Needs,
+}
+
+/// What all tiles add up to.
+struct Sum {
+    film: Film,
+    tally: Tally,
+    cut_max: f64,
+    /// One per tile, summed in the tiles' order at the end: the figure too is the same for
+    /// any number of threads.
+    cut_of_tile: Vec<f64>,
+    non_finite: u64,
+}
+
+impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
+    fn all_tiles(&self) -> Outcome {
+        let started = Instant::now();
+        let crop = self.job.crop;
+        let tiles = tile::tiles(crop);
+        let radiance = Radiance::of(self.scene, &self.needs, self.job.k_max);
+        let sum = Mutex::new(Sum {
+            film: Film::new(crop.x1 - crop.x0, crop.y1 - crop.y0, &self.job.aovs),
+            tally: Tally::default(),
+            cut_max: 0.0,
+            cut_of_tile: vec![0.0; tiles.len()],
+            non_finite: 0,
+        });
+        let next = AtomicUsize::new(0);
+        rayon::broadcast(|_| {
+            let mut worker = TileWorker::new(self, &radiance);
+            while !self.control.is_cancelled() {
+                let index = next.fetch_add(1, Relaxed);
+                let Some(&tile) = tiles.get(index) else { break };
+                worker.render(tile);
+                let mut sum = sum.lock().unwrap_or_else(PoisonError::into_inner);
+                worker.hand_in(tile, index, &mut sum);
+            }
+            sum.lock().unwrap_or_else(PoisonError::into_inner).tally.add(&worker.waves.tally);
+        });
+        let sum = sum.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let pixels = (sum.film.finished.max(1)) as f64;
+        let stats = RenderStats {
+            seconds: started.elapsed().as_secs_f64(),
+            rays: sum.tally.rays,
+            cut_off_max: sum.cut_max,
+            cut_off_mean: sum.cut_of_tile.iter().sum::<f64>() / pixels,
+            non_finite_samples: sum.non_finite,
+            shadow_rays_facing_away: sum.tally.facing_away,
+            branches_below_cut: sum.tally.below_cut,
+        };
+        Outcome { film: sum.film, stats }
+    }
+}
+
+impl Tally {
+    fn add(&mut self, o: &Self) {
+        self.rays.camera += o.rays.camera;
+        self.rays.shadow += o.rays.shadow;
+        self.rays.reflected += o.rays.reflected;
+        self.rays.refracted += o.rays.refracted;
+        self.facing_away += o.facing_away;
+        self.below_cut += o.below_cut;
+    }
+}
+
+/// One thread's buffers, and the tile it works on.
+struct TileWorker<'a, B, const SECONDARY: bool> {
+    render: &'a Render<'a, B, SECONDARY>,
+    waves: Waves<'a, B, SECONDARY>,
+    batch: PacketBatch<RayHitPacket>,
+    pixels: Vec<(u32, u32)>,
+    sums: Vec<PixelSum>,
+}
+
+/// A pixel while its samples come in.
+#[derive(Clone, Debug, Default)]
+struct PixelSum {
+    color: DVec3,
+    cut: f64,
+    counted: u32,
+    hits: u32,
+    depth: f64,
+    normal: DVec3,
+    albedo: Vec3,
+    id: [u32; 2],
+    cost: u32,
+}
+
+impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
+    fn new(render: &'a Render<'a, B, SECONDARY>, radiance: &'a Radiance) -> Self {
+        let waves = Waves::new(render.scene, render.backend, render.job, &render.needs, radiance);
+        Self { render, waves, batch: PacketBatch::default(), pixels: Vec::new(), sums: Vec::new() }
+    }
+
+    fn render(&mut self, tile: Crop) {
+        let Render { camera, job, control, .. } = self.render;
+        self.pixels = tile::pixels(tile);
+        self.sums.clear();
+        self.sums.resize(self.pixels.len(), PixelSum::default());
+        let coherence = Coherence::Coherent;
+        let pixels = std::mem::take(&mut self.pixels);
+        let mut first_pixel = 0;
+        for segment in tile::segments(&pixels, job.spp) {
+            let before = self.waves.tally.rays.total();
+            segment.camera_rays(camera, job, &mut self.batch);
+            self.waves.trace(&mut self.batch, coherence);
+            self.add_up(first_pixel, &segment);
+            if segment.first + segment.samples == job.spp {
+                first_pixel += segment.pixels.len();
+            }
+            control.rays.fetch_add(self.waves.tally.rays.total() - before, Relaxed);
+        }
+        self.pixels = pixels;
+    }
+
+    /// Adds the samples of a segment to their pixels, in order.
+    fn add_up(&mut self, first_pixel: usize, segment: &tile::Segment<'_>) {
+        let samples = segment.samples as usize;
+        for (slot, color) in self.waves.gathered.color.iter().enumerate() {
+            let sum = &mut self.sums[first_pixel + slot / samples];
+            let color = color.as_vec3();
+            if color.is_finite() {
+                sum.color += color.as_dvec3();
+                sum.counted += 1;
+            }
+            sum.cut += self.waves.gathered.cut[slot];
+        }
+        if let Some(cost) = &self.waves.gathered.cost {
+            cost.iter().enumerate().for_each(|(slot, c)| self.sums[first_pixel + slot / samples].cost += c);
+        }
+        if self.render.job.aovs.iter().any(|&a| a != Aov::Cost) {
+            self.first_hits(first_pixel, segment);
+        }
+    }
+
+    /// What the auxiliary images show of the camera rays' hits.
+    fn first_hits(&mut self, first_pixel: usize, segment: &tile::Segment<'_>) {
+        let samples = segment.samples as usize;
+        let scene = self.render.scene;
+        for slot in 0..self.batch.len() {
+            let (packet, lane) = (&self.batch.packets()[slot / LANES], slot % LANES);
+            let Some(hit) = packet.hit(lane) else { continue };
+            let ray = packet.ray.get(lane);
+            let point = surface::SurfacePoint::new(scene, &ray, &hit);
+            let sum = &mut self.sums[first_pixel + slot / samples];
+            if slot % samples == 0 && segment.first == 0 {
+                sum.id = [hit.geom_id + 1, hit.prim_id + 1];
+            }
+            sum.hits += 1;
+            sum.depth += point.t * ray.d.as_dvec3().length() * scene.frame.world_per_local();
+            sum.normal += point.ns;
+            sum.albedo += scene.materials[point.material].diffuse;
+        }
+    }
+
+    /// Puts the finished tile into the film.
+    fn hand_in(&self, tile: Crop, index: usize, sum: &mut Sum) {
+        let (crop, spp) = (self.render.job.crop, self.render.job.spp);
+        let width = sum.film.width as usize;
+        for (&(x, y), pixel) in self.pixels.iter().zip(&self.sums) {
+            let at = (y - crop.y0) as usize * width + (x - crop.x0) as usize;
+            let color = pixel.color / f64::from(pixel.counted.max(1));
+            sum.film.color[at] = color.as_vec3().to_array();
+            sum.non_finite += u64::from(spp - pixel.counted);
+            let cut = pixel.cut / f64::from(spp);
+            sum.cut_max = sum.cut_max.max(cut);
+            sum.cut_of_tile[index] += cut;
+            for image in &mut sum.film.aovs {
+                pixel.write(image, at, spp);
+            }
+        }
+        let pixels = self.pixels.len();
+        debug_assert_eq!(pixels, ((tile.x1 - tile.x0) * (tile.y1 - tile.y0)) as usize);
+        sum.film.finished += pixels;
+        self.render.control.pixels.fetch_add(pixels as u64, Relaxed);
+    }
+}
+
+impl PixelSum {
+    fn write(&self, image: &mut AovImage, at: usize, spp: u32) {
+        let hits = f64::from(self.hits.max(1));
+        let set = |data: &mut [f32], values: &[f32]| {
+            data[at * values.len()..][..values.len()].copy_from_slice(values);
+        };
+        match image.kind {
+            Aov::Depth if self.hits == 0 => set(&mut image.data, &[f32::INFINITY]),
+            Aov::Depth => set(&mut image.data, &[(self.depth / hits) as f32]),
+            Aov::Normal => set(&mut image.data, &(self.normal / hits).as_vec3().to_array()),
+            Aov::Albedo => set(&mut image.data, &(self.albedo / spp as f32).to_array()),
+            Aov::Id => set(&mut image.data, &self.id.map(|i| i as f32)),
+            Aov::Hits => set(&mut image.data, &[self.hits as f32 / spp as f32]),
+            Aov::Cost => set(&mut image.data, &[self.cost as f32]),
+        }
+    }
+}

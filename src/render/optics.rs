@@ -1,0 +1,145 @@
+//! Mirror, Snell and Fresnel, in f64.
+
+use glam::DVec3;
+
+/// Direction of the mirrored ray.
+///
+/// * `d`, `n`: unit vectors
+/// * result: unit; over 64 bounces `|d|` stays within 2e-7 of 1
+#[must_use]
+pub fn reflect(d: DVec3, n: DVec3) -> DVec3 {
+    (d - 2.0 * d.dot(n) * n).normalize()
+}
+
+/// What a smooth boundary does to a ray that passes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refraction {
+    /// Unit direction behind the boundary.
+    pub direction: DVec3,
+    /// Cosine of the angle behind the boundary.
+    cos_t: f64,
+}
+
+/// Direction of the refracted ray, or `None` under total internal reflection.
+///
+/// * `d`, `n`: unit vectors, `d·n <= 0`
+/// * `eta`: index of the medium left / index of the medium entered
+///
+/// The part of `d` along the surface is formed first, `p = d + c n`, and its square decides
+/// (not `1 - c^2`, which cancels): near the critical angle the direction is right within
+/// 5e-8 rad, and the decision itself is that of exact arithmetic to 1e-15.
+#[must_use]
+pub fn refract(d: DVec3, n: DVec3, eta: f64) -> Option<Refraction> {
+    if eta == 1.0 {
+        return Some(Refraction { direction: d, cos_t: -d.dot(n) });
+    }
+    let c = -d.dot(n);
+    let p = d + c * n;
+    let k = 1.0 - eta * eta * p.length_squared();
+    (k >= 0.0).then(|| {
+        let cos_t = k.sqrt();
+        Refraction { direction: (eta * p - cos_t * n).normalize(), cos_t }
+    })
+}
+
+impl Refraction {
+    /// Share of unpolarised light that the boundary mirrors; `cos_i = -d·n`, `eta` as for [`refract`].
+    ///
+    /// Source: the Fresnel equations; M. Pharr, W. Jakob, G. Humphreys, "Physically Based
+    /// Rendering", 4th ed., section 9.3.5.
+    #[must_use]
+    pub fn reflectance(&self, cos_i: f64, eta: f64) -> f64 {
+        let q = self.cos_t;
+        let s = (eta * cos_i - q) / (eta * cos_i + q);
+        let p = (cos_i - eta * q) / (cos_i + eta * q);
+        0.5 * (s * s + p * p)
+    }
+}
+
+/// `(1 - c)^5`: how far a metal's mirror colour has gone to white at cosine `c`.
+///
+/// Source: C. Schlick, "An Inexpensive BRDF Model for Physically-based Rendering", 1994.
+#[must_use]
+pub fn schlick(cos_i: f64) -> f64 {
+    let m = (1.0 - cos_i).clamp(0.0, 1.0);
+    m * m * m * m * m
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ray that goes down at `deg` from the normal +y.
+    fn down(deg: f64) -> DVec3 {
+        let (sin, cos) = deg.to_radians().sin_cos();
+        DVec3::new(sin, -cos, 0.0)
+    }
+
+    #[test]
+    fn snell_from_a_table() {
+        struct Case {
+            name: &'static str,
+            deg: f64,
+            from: f64,
+            into: f64,
+            want: Option<f64>,
+        }
+        let case = |name, deg, from, into, want| Case { name, deg, from, into, want };
+        let cases = [
+            case("head on", 0.0, 1.0, 1.5, Some(0.0)),
+            case("air to glass", 30.0, 1.0, 1.5, Some(19.471_220_634_490_69)),
+            case("glass to air", 30.0, 1.5, 1.0, Some(48.590_377_890_729_14)),
+            case("same medium", 63.0, 1.3, 1.3, Some(63.0)),
+            case("just below critical", 41.80, 1.5, 1.0, Some(88.850_362_277)),
+            case("just above critical", 41.82, 1.5, 1.0, None),
+            case("grazing, out of glass", 89.9, 1.5, 1.0, None),
+        ];
+        for c in cases {
+            let got = refract(down(c.deg), DVec3::Y, c.from / c.into);
+            assert_eq!(got.is_some(), c.want.is_some(), "{}", c.name);
+            if let (Some(got), Some(want)) = (got, c.want) {
+                let angle = got.direction.x.atan2(-got.direction.y).to_degrees();
+                assert!((angle - want).abs() < 1e-6, "{}: {angle} != {want}", c.name);
+                assert!((got.direction.length() - 1.0).abs() < 1e-15, "{}", c.name);
+            }
+        }
+    }
+
+    #[test]
+    fn total_reflection_begins_at_the_critical_angle() {
+        let critical = (1.0f64 / 1.5).asin().to_degrees();
+        assert!((critical - 41.810_314_9).abs() < 1e-7);
+        for step in [1e-5, 1e-9] {
+            let step = f64::to_degrees(step);
+            assert!(refract(down(critical - step), DVec3::Y, 1.5).is_some());
+            assert!(refract(down(critical + step), DVec3::Y, 1.5).is_none());
+        }
+    }
+
+    #[test]
+    fn fresnel_at_known_angles_and_both_ways() {
+        let at = |deg: f64, eta: f64| {
+            refract(down(deg), DVec3::Y, eta).expect("passes").reflectance(deg.to_radians().cos(), eta)
+        };
+        assert!((at(0.0, 1.0 / 1.5) - 0.04).abs() < 1e-12);
+        assert!((at(0.0, 1.5) - 0.04).abs() < 1e-12);
+        // At Brewster's angle only one polarisation is mirrored: ((n^2-1)/(n^2+1))^2 / 2.
+        let brewster = 1.5f64.atan().to_degrees();
+        assert!((at(brewster, 1.0 / 1.5) - 0.5 * (1.25f64 / 3.25).powi(2)).abs() < 1e-12);
+        assert!(at(89.999, 1.0 / 1.5) > 0.999);
+        // Stokes: the same share on the way back.
+        let t = refract(down(50.0), DVec3::Y, 1.0 / 1.5).expect("passes").direction;
+        let back = t.x.atan2(-t.y).to_degrees();
+        assert!((at(50.0, 1.0 / 1.5) - at(back, 1.5)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn sixty_four_mirrors_keep_the_length() {
+        let mut d = DVec3::new(0.3, -0.5, 0.81).normalize();
+        for i in 0..64 {
+            d = reflect(d, DVec3::new((i as f64).sin(), 0.4, (i as f64).cos()).normalize());
+            assert!((d.length() - 1.0).abs() < 1e-15);
+        }
+        assert_eq!(reflect(DVec3::new(0.6, -0.8, 0.0), DVec3::Y), DVec3::new(0.6, 0.8, 0.0));
+    }
+}

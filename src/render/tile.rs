@@ -1,0 +1,145 @@
+//! A tile of the image: which rays it sends and where their colours go.
+
+use super::job::{Crop, Job};
+use crate::geom::{LANES, PacketBatch, RayHitPacket};
+use crate::math::{PixelSamples, concentric_disc};
+use crate::scene::{Camera, CameraRays};
+use crate::simd;
+use glam::DVec2;
+
+/// Pixels along the side of a tile.
+pub const TILE: u32 = 32;
+
+/// Camera rays of one wave: what fits in the second-level cache with its answers.
+const SEGMENT: usize = 4096;
+
+/// Where a lone sample goes through its pixel: beside the centre, so that a camera aligned
+/// with a mesh does not send every ray at a vertex or along an edge.
+const BESIDE_CENTRE: (f64, f64) = (0.500_37, 0.500_61);
+const CENTRE: (f64, f64) = (0.5, 0.5);
+
+/// The tiles of `crop`, row by row.
+#[must_use]
+pub fn tiles(crop: Crop) -> Vec<Crop> {
+    let starts = |from: u32, to: u32| (from..to).step_by(TILE as usize);
+    starts(crop.y0, crop.y1)
+        .flat_map(|y| starts(crop.x0, crop.x1).map(move |x| (x, y)))
+        .map(|(x, y)| Crop { x0: x, y0: y, x1: (x + TILE).min(crop.x1), y1: (y + TILE).min(crop.y1) })
+        .collect()
+}
+
+/// Pixels of a tile along a Z-curve, so that any 4 or 16 in a row form a square.
+#[must_use]
+pub fn pixels(tile: Crop) -> Vec<(u32, u32)> {
+    let even_bits = |i: u32| (0..5).fold(0, |a, b| a | ((i >> (2 * b)) & 1) << b);
+    (0..TILE * TILE)
+        .map(|i| (tile.x0 + even_bits(i), tile.y0 + even_bits(i >> 1)))
+        .filter(|&(x, y)| x < tile.x1 && y < tile.y1)
+        .collect()
+}
+
+/// Samples of a few neighbouring pixels that travel as one wave. Sample `j` of pixel `i` is
+/// ray `i * samples + j`, so the lanes of a packet hold a square of pixels, or many samples
+/// of one pixel: whatever is most alike.
+#[derive(Clone, Copy, Debug)]
+pub struct Segment<'a> {
+    /// The pixels.
+    pub pixels: &'a [(u32, u32)],
+    /// First sample.
+    pub first: u32,
+    /// Samples of each pixel.
+    pub samples: u32,
+}
+
+/// Splits the work of a tile into segments; all samples of a pixel come in order.
+pub fn segments(pixels: &[(u32, u32)], spp: u32) -> impl Iterator<Item = Segment<'_>> {
+    let samples = spp.min(LANES as u32);
+    let at_once = SEGMENT / samples as usize;
+    pixels.chunks(at_once).flat_map(move |pixels| {
+        (0..spp).step_by(samples as usize).map(move |first| Segment { pixels, first, samples: samples.min(spp - first) })
+    })
+}
+
+impl Segment<'_> {
+    /// Fills `batch` with the camera rays.
+    pub fn camera_rays(&self, camera: &Camera, job: &Job, batch: &mut PacketBatch<RayHitPacket>) {
+        let rays = self.pixels.len() * self.samples as usize;
+        batch.resize(rays);
+        let (mut at, mut lens) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
+        for (k, (packet, live)) in batch.packets_mut().enumerate() {
+            for lane in 0..live {
+                let ray = k * LANES + lane;
+                let pixel = self.pixels[ray / self.samples as usize];
+                let sample = self.first + (ray % self.samples as usize) as u32;
+                let (x, y, disc) = image_point(camera, job, pixel, sample);
+                (at[0][lane], at[1][lane]) = (x, y);
+                (lens[0][lane], lens[1][lane]) = (disc.x, disc.y);
+            }
+            simd::run(CameraRays { camera, at: &at, lens: &lens, packet: &mut packet.ray });
+        }
+    }
+}
+
+/// Where sample `sample` of `pixel` goes through the image, in pixels, and through the unit lens.
+#[inline]
+fn image_point(camera: &Camera, job: &Job, pixel: (u32, u32), sample: u32) -> (f64, f64, DVec2) {
+    let (x, y) = (f64::from(pixel.0), f64::from(pixel.1));
+    let lone = if job.centre { CENTRE } else { BESIDE_CENTRE };
+    if job.spp == 1 && camera.lens.is_none() {
+        return (x + lone.0, y + lone.1, DVec2::ZERO);
+    }
+    let [a, b, u, v] = PixelSamples::new(pixel.0, pixel.1, job.seed).point(sample).map(f64::from);
+    let (dx, dy) = if job.spp == 1 { lone } else { (a, b) };
+    let disc = if camera.lens.is_some() { concentric_disc(u, v) } else { DVec2::ZERO };
+    (x + dx, y + dy, disc)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    const CROP: Crop = Crop { x0: 5, y0: 3, x1: 80, y1: 50 };
+
+    #[test]
+    fn tiles_cover_the_crop_once() {
+        let mut seen = HashSet::new();
+        for tile in tiles(CROP) {
+            for p in pixels(tile) {
+                assert!(seen.insert(p), "{p:?} twice");
+            }
+        }
+        assert_eq!(seen.len(), 75 * 47);
+        assert!(seen.iter().all(|&(x, y)| (5..80).contains(&x) && (3..50).contains(&y)));
+    }
+
+    #[test]
+    fn sixteen_pixels_in_a_row_are_a_square() {
+        let all = pixels(Crop { x0: 64, y0: 32, x1: 96, y1: 64 });
+        assert_eq!(all.len(), 1024);
+        for block in all.chunks(16) {
+            let spread = |f: fn(&(u32, u32)) -> u32| {
+                block.iter().map(f).max().expect("16 of them") - block.iter().map(f).min().expect("16 of them")
+            };
+            assert_eq!((spread(|p| p.0), spread(|p| p.1)), (3, 3));
+        }
+    }
+
+    #[test]
+    fn segments_hold_every_sample_once_and_in_order() {
+        let all = pixels(tiles(CROP)[0]);
+        for spp in [1, 2, 5, 16, 17, 70] {
+            let mut next = vec![0; all.len()];
+            let mut at = std::collections::HashMap::new();
+            at.extend(all.iter().enumerate().map(|(i, &p)| (p, i)));
+            for s in segments(&all, spp) {
+                assert!((1..=SEGMENT).contains(&(s.pixels.len() * s.samples as usize)));
+                for p in s.pixels {
+                    assert_eq!(next[at[p]], s.first, "spp {spp}");
+                    next[at[p]] += s.samples;
+                }
+            }
+            assert!(next.iter().all(|&n| n == spp), "spp {spp}");
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! What can be wrong with a scene or a file it names, said so that a user can act on it.
+
+use std::path::{Path, PathBuf};
+use std::{fmt, io};
+
+/// A file that cannot be made into a scene.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The operating system refused, or the file changed meanwhile.
+    #[error("cannot read {}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        #[source]
+        source: io::Error,
+    },
+    /// A directory where a file was expected.
+    #[error("{} is a directory: name a file in it", path.display())]
+    NotAFile {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// Something in the text. Lines and columns count from 1, columns in characters.
+    #[error("{}:{line}:{column}: {what}", path.display())]
+    At {
+        /// The file.
+        path: PathBuf,
+        /// Line.
+        line: u64,
+        /// Column of the offending word.
+        column: u64,
+        /// What is wrong, and what was expected.
+        what: String,
+    },
+    /// A mesh file with nothing to see in it.
+    #[error("{}: no renderable faces: {why}", path.display())]
+    NoFaces {
+        /// The file.
+        path: PathBuf,
+        /// What it holds instead.
+        why: String,
+    },
+    /// A file names another one outside the folders it may read from.
+    #[error(
+        "{}:{line}: {} is outside the folder of the file that names it; \
+         to read it, pass --allow-path {}",
+        path.display(), target.display(), folder.display()
+    )]
+    Forbidden {
+        /// The file that names it.
+        path: PathBuf,
+        /// Line of the statement.
+        line: u64,
+        /// What it names, links resolved.
+        target: PathBuf,
+        /// Folder of `target`.
+        folder: PathBuf,
+    },
+    /// Faces, but none that a ray could meet.
+    #[error("{}: none of its {faces} triangles can be hit: they have no area or lie out of range", path.display())]
+    NothingToHit {
+        /// The file.
+        path: PathBuf,
+        /// Triangles in it.
+        faces: usize,
+    },
+    /// More of something than 32-bit numbers can index.
+    #[error("{}: {count} {what}, but at most {limit} can be indexed: split the file", path.display())]
+    TooMany {
+        /// The file.
+        path: PathBuf,
+        /// What there is too much of.
+        what: &'static str,
+        /// How many.
+        count: u64,
+        /// How many would do.
+        limit: u64,
+    },
+    /// The caller asked to stop.
+    #[error("stopped on request")]
+    Cancelled,
+}
+
+/// Something odd that did not stop the reading.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Warning {
+    /// The file.
+    pub path: PathBuf,
+    /// Line of the first occurrence, from 1; absent where the whole file is meant.
+    pub line: Option<u64>,
+    /// What was found and what was made of it; says how many more there are.
+    pub what: String,
+}
+
+impl Warning {
+    /// A warning about the whole of `path`.
+    #[must_use]
+    pub fn about(path: &Path, what: String) -> Self {
+        Self { path: path.to_owned(), line: None, what }
+    }
+
+    /// A warning about something on `line` of `path`.
+    #[must_use]
+    pub fn at(path: &Path, line: u64, what: String) -> Self {
+        Self { path: path.to_owned(), line: Some(line), what }
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:", self.path.display())?;
+        if let Some(line) = self.line {
+            write!(f, "{line}:")?;
+        }
+        write!(f, " {}", self.what)
+    }
+}

@@ -1,0 +1,76 @@
+//! From a file on disk to a frozen scene.
+
+use super::{Error, Material, Object, Scene, Warning, obj, smooth};
+use crate::geom::TriangleMesh;
+use glam::Vec3;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// How to read a scene.
+#[derive(Clone)]
+pub struct LoadOptions<'a> {
+    /// Crease angle in degrees for computing normals where the file has none; `None`: flat.
+    pub smooth: Option<f64>,
+    /// Folders besides the file's own that it may name files in.
+    pub allow: Vec<PathBuf>,
+    /// Set by another thread to give up.
+    pub cancel: &'a AtomicBool,
+    /// Told bytes read and bytes in all, from any thread.
+    pub progress: Option<&'a (dyn Fn(u64, u64) + Sync)>,
+}
+
+impl std::fmt::Debug for LoadOptions<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("LoadOptions").field("smooth", &self.smooth).field("allow", &self.allow).finish_non_exhaustive()
+    }
+}
+
+/// A scene and what was odd about its file.
+#[derive(Debug)]
+pub struct Loaded {
+    /// The scene, without lights if the file has none.
+    pub scene: Scene,
+    /// One per kind and file.
+    pub warnings: Vec<Warning>,
+}
+
+/// Colour seen where nothing is hit, for a mesh that says nothing about it.
+const BACKGROUND: Vec3 = Vec3::new(0.055, 0.065, 0.08);
+
+/// Reads the mesh in `path`.
+///
+/// # Errors
+/// Whatever stops the scene from being rendered, with the place in the file.
+pub fn load(path: &Path, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
+    let read = obj::ReadOptions {
+        normals: true,
+        uv: false,
+        allow: &options.allow,
+        cancel: options.cancel,
+        progress: options.progress,
+    };
+    let file = obj::read(path, &read)?;
+    let mut warnings = file.warnings;
+    let mesh = Arc::new(TriangleMesh::new(file.points, file.faces));
+    if mesh.bounds().is_empty() {
+        return Err(Error::NothingToHit { path: path.to_owned(), faces: mesh.face_count() });
+    }
+    let mut normals = file.normals;
+    if let Some(angle) = options.smooth {
+        if normals.is_some() {
+            warnings.push(Warning::about(path, "the file has normals of its own: --smooth changes nothing".into()));
+        } else {
+            normals = Some(smooth::crease_normals(&mesh, angle));
+        }
+    }
+    let scene = Scene {
+        frame: file.frame,
+        objects: vec![Object { mesh, normals, face_materials: file.face_materials }],
+        materials: file.materials.iter().map(Material::from).collect(),
+        lights: Vec::new(),
+        ambient: Vec3::ZERO,
+        background: BACKGROUND,
+    };
+    Ok(Loaded { scene, warnings })
+}

@@ -1,0 +1,155 @@
+//! Materials as shading reads them: every weight resolved to linear RGB.
+
+use super::obj::MtlMaterial;
+use glam::Vec3;
+
+/// How a surface answers light. All colours are linear RGB.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Name in the file.
+    pub name: String,
+    /// Multiplies the scene's ambient light.
+    pub ambient: Vec3,
+    /// Multiplies a light's colour and N·L.
+    pub diffuse: Vec3,
+    /// Multiplies a light's colour and (N·H)^shininess.
+    pub specular: Vec3,
+    /// Blinn-Phong exponent, at least 0.
+    pub shininess: f32,
+    /// Added whatever the light.
+    pub emission: Vec3,
+    /// The mirrored ray.
+    pub reflect: Reflect,
+    /// Weight of the refracted ray; under [`Reflect::Fresnel`] times `1 - F`.
+    pub refract: Vec3,
+    /// Index of refraction against the outside.
+    pub ior: f64,
+}
+
+/// Weight of the mirrored ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reflect {
+    /// The same at every angle; zero for none.
+    Constant(Vec3),
+    /// The Fresnel equations for a dielectric of the material's `ior`.
+    Fresnel,
+    /// Schlick's formula for a metal with this colour head on.
+    Metal(Vec3),
+}
+
+impl Default for Material {
+    /// A light grey plastic.
+    fn default() -> Self {
+        Self {
+            name: "default".into(),
+            ambient: Vec3::splat(0.75),
+            diffuse: Vec3::splat(0.75),
+            specular: Vec3::splat(0.15),
+            shininess: 40.0,
+            emission: Vec3::ZERO,
+            reflect: Reflect::NONE,
+            refract: Vec3::ZERO,
+            ior: 1.0,
+        }
+    }
+}
+
+impl Reflect {
+    /// No mirrored ray.
+    pub const NONE: Self = Self::Constant(Vec3::ZERO);
+
+    /// Largest weight at any angle.
+    #[must_use]
+    pub fn upper_bound(self) -> Vec3 {
+        match self {
+            Self::Constant(weight) => weight,
+            Self::Fresnel | Self::Metal(_) => Vec3::ONE,
+        }
+    }
+}
+
+impl Material {
+    /// Whether hits send out mirrored rays.
+    #[must_use]
+    pub fn reflects(&self) -> bool {
+        match self.reflect {
+            Reflect::Constant(weight) => weight != Vec3::ZERO,
+            Reflect::Fresnel => self.ior != 1.0,
+            Reflect::Metal(_) => true,
+        }
+    }
+
+    /// Whether hits send out refracted rays.
+    #[must_use]
+    pub fn refracts(&self) -> bool {
+        self.refract != Vec3::ZERO
+    }
+
+    /// Whether a light can change how it looks.
+    #[must_use]
+    pub fn is_lit(&self) -> bool {
+        self.diffuse != Vec3::ZERO || self.specular != Vec3::ZERO
+    }
+
+    /// Largest share of the light of its secondary rays that a hit passes on.
+    #[must_use]
+    pub fn passed_on(&self) -> f32 {
+        match self.reflect {
+            // F + (1 - F): never more than the larger of the two.
+            Reflect::Fresnel => self.refract.max_element().max(1.0),
+            other => (other.upper_bound() + self.refract).max_element(),
+        }
+    }
+}
+
+impl From<&MtlMaterial> for Material {
+    /// What an MTL entry means here: `illum` decides which of its colours count.
+    fn from(m: &MtlMaterial) -> Self {
+        let illum = m.illum.unwrap_or(if m.ks.is_some() { 2 } else { 1 });
+        let color = Vec3::from(m.kd.unwrap_or([0.75; 3]));
+        let ks = Vec3::from(m.ks.unwrap_or([0.0; 3]));
+        // Many exporters always write `Ka 1 1 1`.
+        let ambient = m.ka.filter(|&ka| ka != [1.0; 3]).map_or(color, Vec3::from);
+        let opacity = m.d.unwrap_or(1.0);
+        let roughness = m.pr.filter(|&r| r > 0.0);
+        let from_roughness = roughness.map(|r| (2.0 / (r * r * r * r) - 2.0).max(0.0));
+        let shiny = !matches!(illum, 0 | 1);
+        let metallic = m.pm.unwrap_or(0.0).clamp(0.0, 1.0);
+        let out = Self {
+            name: m.name.clone(),
+            ambient,
+            diffuse: color,
+            specular: if shiny { ks.lerp(ks * color, metallic) } else { Vec3::ZERO },
+            shininess: m.ns.or(from_roughness).unwrap_or(0.0).clamp(0.0, 1e6),
+            emission: Vec3::from(m.ke.unwrap_or([0.0; 3])),
+            reflect: match illum {
+                3 | 4 | 6 => Reflect::Constant(ks),
+                5 => Reflect::Metal(ks),
+                7 => Reflect::Fresnel,
+                _ => Reflect::NONE,
+            },
+            refract: Vec3::ZERO,
+            ior: f64::from(m.ni.unwrap_or(if matches!(illum, 6 | 7) { 1.5 } else { 1.0 })),
+        };
+        let tint = Vec3::from(m.tf.unwrap_or([1.0; 3]));
+        match illum {
+            0 => Self {
+                emission: out.emission + color,
+                ambient: Vec3::ZERO,
+                diffuse: Vec3::ZERO,
+                specular: Vec3::ZERO,
+                ..out
+            },
+            4 | 6 | 7 | 9 => Self { refract: tint * m.d.map_or(1.0, |d| 1.0 - d), ..out },
+            // Plain alpha: what is not covered is seen through, unbent.
+            1 | 2 if opacity < 1.0 => Self {
+                ambient: out.ambient * opacity,
+                diffuse: out.diffuse * opacity,
+                refract: tint * (1.0 - opacity),
+                ior: 1.0,
+                ..out
+            },
+            _ => out,
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! Reads OBJ files and their material libraries.
+//!
+//! The file is cut into pieces at line ends and gone over twice, by all threads: first to
+//! count, then to parse every number straight into its place. Nothing is joined, copied or
+//! looked up; positions, normals and texture coordinates keep their own indices. The
+//! result does not depend on the number of threads or the size of the pieces.
+//!
+//! Of the format it reads `v vt vn f usemtl mtllib o g`, with continued lines, comments
+//! after data and negative indices. Weights and colours of vertices are passed over,
+//! lines, points and free-form surfaces skipped with a warning. Polygons become triangles,
+//! in the order of the file, with the winding of the file.
+
+mod corners;
+mod cursor;
+mod materials;
+mod mtl;
+mod notes;
+mod parse;
+mod pieces;
+mod polygon;
+mod read;
+mod source;
+mod survey;
+#[cfg(test)]
+mod tests;
+
+pub use corners::CornerData;
+pub use mtl::MtlMaterial;
+
+use super::{Error, Warning};
+use crate::math::Frame;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// What to read, and from where.
+#[derive(Clone, Copy)]
+pub struct ReadOptions<'a> {
+    /// Whether normals are wanted. What is not wanted is checked but not stored.
+    pub normals: bool,
+    /// Whether texture coordinates are wanted.
+    pub uv: bool,
+    /// Folders, besides the file's own, below which material libraries may be read.
+    pub allow: &'a [PathBuf],
+    /// Reading stops soon after this becomes true.
+    pub cancel: &'a AtomicBool,
+    /// Told how many bytes are done, of how many, from any thread and not in order. As
+    /// the file is gone over twice, that is twice its size.
+    pub progress: Option<&'a (dyn Fn(u64, u64) + Sync)>,
+}
+
+impl std::fmt::Debug for ReadOptions<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut f = f.debug_struct("ReadOptions");
+        f.field("normals", &self.normals).field("uv", &self.uv).field("allow", &self.allow).finish_non_exhaustive()
+    }
+}
+
+/// A mesh as its file has it.
+#[derive(Debug)]
+pub struct ObjFile {
+    /// Where the stored points lie in the file's coordinates.
+    pub frame: Frame,
+    /// xyz of every vertex, then one float of padding. Each is the file's number, less the
+    /// frame's origin and scaled in f64, rounded to f32 once; all are finite.
+    pub points: Vec<f32>,
+    /// Vertices of every triangle, in range.
+    pub faces: Vec<[u32; 3]>,
+    /// Normals, of unit length or zero; absent where no face has any or none are wanted.
+    pub normals: Option<CornerData>,
+    /// Texture coordinates, likewise.
+    pub uvs: Option<CornerData>,
+    /// Material of each triangle, an index into `materials`; absent if one serves all.
+    pub face_materials: Option<Vec<u32>>,
+    /// The materials that faces have, in order of first use; at least one.
+    pub materials: Vec<MtlMaterial>,
+    /// What was in the file.
+    pub counts: Counts,
+    /// What was odd, once a kind and file.
+    pub warnings: Vec<Warning>,
+}
+
+/// How much of everything a file holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// `v` lines.
+    pub vertices: u64,
+    /// `vt` lines.
+    pub textures: u64,
+    /// `vn` lines.
+    pub normals: u64,
+    /// `f` lines, as written.
+    pub polygons: u64,
+    /// Triangles that they were split into.
+    pub triangles: u64,
+    /// Polygons that ear clipping had to split.
+    pub clipped: u64,
+    /// `f` lines with one or two corners, skipped.
+    pub short_faces: u64,
+    /// `o` lines.
+    pub objects: u64,
+    /// `g` lines.
+    pub groups: u64,
+    /// `l` lines, skipped.
+    pub polylines: u64,
+    /// `p` lines, skipped.
+    pub points: u64,
+    /// Materials that the libraries describe and no face has.
+    pub unused_materials: u64,
+}
+
+/// Reads the OBJ file at `path` and the libraries it names.
+///
+/// # Errors
+/// [`Error::Read`] and [`Error::NotAFile`] for what is no readable file, [`Error::At`] for
+/// the first line that cannot be understood, [`Error::NoFaces`] for a file with nothing to
+/// render, [`Error::Forbidden`] for a library outside the allowed folders,
+/// [`Error::TooMany`] beyond what 32-bit indices can count, [`Error::Cancelled`].
+pub fn read(path: &Path, options: &ReadOptions<'_>) -> Result<ObjFile, Error> {
+    /// Small enough for a second-level cache, large enough to make each piece's own cost vanish.
+    const PIECE: u64 = 1 << 18;
+    read::read(&source::Source::open(path, options.cancel)?, options, PIECE)
+}
+
+/// Bytes as text, whatever they are.
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// Bytes as they may appear in a message: not long, and nothing a terminal obeys.
+fn excerpt(bytes: &[u8]) -> String {
+    const MOST: usize = 40;
+    let whole = String::from_utf8_lossy(&bytes[..bytes.len().min(4 * MOST)]);
+    let shown: String = whole.chars().take(MOST).map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
+    if shown.len() < bytes.len() && whole.chars().count() > MOST { format!("{shown}…") } else { shown }
+}
+
+/// Without blanks at either end.
+fn trimmed(bytes: &[u8]) -> &[u8] {
+    let start = bytes.iter().position(|&c| c > b' ').unwrap_or(bytes.len());
+    let end = bytes.iter().rposition(|&c| c > b' ').map_or(start, |n| n + 1);
+    &bytes[start..end]
+}
+
+/// Without quotes around all of it.
+fn unquoted(bytes: &[u8]) -> &[u8] {
+    match bytes {
+        [b'"', inner @ .., b'"'] => trimmed(inner),
+        _ => bytes,
+    }
+}

@@ -1,0 +1,112 @@
+//! Works on all pieces of a file at once.
+
+use super::super::Error;
+use super::ReadOptions;
+use super::parse::Trouble;
+use super::source::Source;
+use super::survey::Survey;
+use rayon::prelude::*;
+use std::io;
+use std::ops::Range;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+
+/// A file, cut.
+pub(super) struct Pieces<'a> {
+    pub(super) source: &'a Source,
+    pub(super) options: &'a ReadOptions<'a>,
+    pub(super) ranges: Vec<Range<u64>>,
+    /// Bytes gone over so far.
+    done: AtomicU64,
+}
+
+/// What stopped the work on a piece.
+enum Stop {
+    Error(Error),
+    Trouble(Trouble),
+}
+
+impl<'a> Pieces<'a> {
+    pub(super) fn cut(source: &'a Source, options: &'a ReadOptions<'a>, size: u64) -> Result<Self, Error> {
+        Ok(Self { source, options, ranges: source.pieces(size)?, done: AtomicU64::new(0) })
+    }
+
+    /// Calls `work(piece, job, lines, joined)` for every piece: its number, its job, its
+    /// text, and how many line ends are missing in that. Returns the results in order, or
+    /// the error that comes first in the file. `surveys` serves to tell its line.
+    pub(super) fn each<J, R, F>(&self, jobs: Vec<J>, surveys: &[Survey], work: F) -> Result<Vec<R>, Error>
+    where
+        J: Send,
+        R: Send,
+        F: Fn(usize, J, &[u8], u64) -> Result<R, Trouble> + Sync,
+    {
+        let first_bad = AtomicUsize::new(usize::MAX);
+        let queue = Mutex::new(jobs.into_iter().enumerate());
+        let next = || queue.lock().expect("nothing panics while it holds the lock").next();
+        let worker = |_| {
+            let (mut buf, mut out) = (Vec::new(), Vec::new());
+            while let Some((i, job)) = next() {
+                if i > first_bad.load(Ordering::Relaxed) {
+                    break;
+                }
+                let result = self.one(i, &mut buf, |lines, joined| work(i, job, lines, joined));
+                if result.is_err() {
+                    first_bad.fetch_min(i, Ordering::Relaxed);
+                }
+                out.push((i, result));
+            }
+            out
+        };
+        let workers = rayon::current_num_threads().min(self.ranges.len());
+        let mut results: Vec<_> = (0..workers).into_par_iter().with_max_len(1).flat_map_iter(worker).collect();
+        results.sort_unstable_by_key(|&(i, _)| i);
+        results
+            .into_iter()
+            .map(|(i, result)| {
+                result.map_err(|stop| match stop {
+                    Stop::Error(e) => e,
+                    Stop::Trouble(t) => self.located(i, t, surveys),
+                })
+            })
+            .collect()
+    }
+
+    fn one<R>(
+        &self,
+        i: usize,
+        buf: &mut Vec<u8>,
+        work: impl FnOnce(&[u8], u64) -> Result<R, Trouble>,
+    ) -> Result<R, Stop> {
+        if self.options.cancel.load(Ordering::Relaxed) {
+            return Err(Stop::Error(Error::Cancelled));
+        }
+        let range = &self.ranges[i];
+        let joined = self.source.lines(range, buf).map_err(Stop::Error)?;
+        let result = work(buf, joined).map_err(Stop::Trouble)?;
+        let length = range.end - range.start;
+        let done = self.done.fetch_add(length, Ordering::Relaxed) + length;
+        if let Some(progress) = self.options.progress {
+            let total = 2 * self.source.len;
+            progress(done.min(total), total);
+        }
+        Ok(result)
+    }
+
+    fn located(&self, piece: usize, trouble: Trouble, surveys: &[Survey]) -> Error {
+        let path = self.source.path.clone();
+        match trouble {
+            Trouble::Changed => Error::Read { path, source: io::Error::other("it changed while it was being read") },
+            Trouble::Text { at, what } => match self.place(self.ranges[piece].start + at as u64, surveys) {
+                Ok((line, column)) => Error::At { path, line, column, what },
+                Err(e) => e,
+            },
+        }
+    }
+
+    /// Line and column of the byte at `offset` of the file.
+    pub(super) fn place(&self, offset: u64, surveys: &[Survey]) -> Result<(u64, u64), Error> {
+        let piece = self.ranges.partition_point(|r| r.end <= offset).min(self.ranges.len() - 1);
+        let lines = surveys[..piece].iter().map(|s| s.tally.lines).sum();
+        self.source.place(offset, &self.ranges[piece], lines)
+    }
+}

@@ -1,0 +1,345 @@
+//! Puts the passes together.
+
+use super::super::{Error, Warning};
+use super::materials::{LibraryStatement, Runs, describe};
+use super::notes::{Kind, Notes};
+use super::parse::{self, Parsed, Plan, Target, Usage};
+use super::pieces::Pieces;
+use super::polygon;
+use super::source::Source;
+use super::survey::{self, Sampling, Survey, Tally, cut, running_totals};
+use super::{CornerData, Counts, ObjFile, ReadOptions};
+use crate::math::Frame;
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Sizes that a stored mesh may have, as multiples of what the sample of its vertices led
+/// to expect; beyond them the frame is made anew.
+const FITTING: std::ops::RangeInclusive<f64> = 1.0 / 65_536.0..=4_294_967_296.0;
+
+/// Reads `source` in pieces of about `piece` bytes.
+pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Result<ObjFile, Error> {
+    let pieces = Pieces::cut(source, options, piece)?;
+    let sampling = Sampling::of_file(source.len);
+    let jobs = vec![(); pieces.ranges.len()];
+    let mut surveys: Vec<Survey> = pieces
+        .each(jobs, &[], |i, (), text, joined| Ok(survey::survey(text, pieces.ranges[i].start, joined, sampling)))?;
+    let (before, total) = running_totals(&surveys);
+    check_size(&total, &pieces)?;
+    let plan = Plan {
+        frame: Frame::fit(&sampling.merge(surveys.iter())),
+        total,
+        normals: options.normals && total.normals > 0,
+        uv: options.uv && total.textures > 0,
+    };
+
+    let mut arrays = Arrays::new(&plan);
+    let mut parsed = pieces.each(arrays.targets(&surveys), &surveys, |i, target, text, _| {
+        parse::parse(text, pieces.ranges[i].start, before[i], &plan, target)
+    })?;
+    if total.triangles == 0 {
+        return Err(no_faces(&pieces, &surveys, &total)?);
+    }
+    let frame = settle_frame(&pieces, &surveys, &mut arrays, plan.frame, &parsed)?;
+    arrays.settle_indices(&parsed);
+    let clipped = split_polygons(&mut arrays, &surveys, &parsed);
+
+    let notes = gather(&mut surveys, &mut parsed);
+    let counts = counts(&total, clipped, &notes);
+    let mut warnings = Vec::new();
+    for note in notes.sorted() {
+        let (line, _) = pieces.place(note.offset, &surveys)?;
+        warnings.push(Warning::at(&source.path, line, note.message()));
+    }
+    let runs = Runs::join(&surveys, &before, total.triangles);
+    let described = describe(&runs.names, &statements(&pieces, &surveys)?, &source.path, options.allow)?;
+    warnings.extend(described.warnings);
+    Ok(ObjFile {
+        frame,
+        face_materials: runs.per_triangle(arrays.faces.len()),
+        normals: arrays.normal_of.map(|indices| CornerData { values: arrays.normals, indices }),
+        uvs: arrays.uv_of.map(|indices| CornerData { values: arrays.uvs, indices }),
+        points: arrays.points,
+        faces: arrays.faces,
+        materials: described.materials,
+        counts: Counts { unused_materials: described.unused as u64, ..counts },
+        warnings,
+    })
+}
+
+/// The arrays that the second pass fills.
+struct Arrays {
+    points: Vec<f32>,
+    faces: Vec<[u32; 3]>,
+    normals: Vec<f32>,
+    uvs: Vec<f32>,
+    /// Absent where not wanted or where no corner has any; `Some(None)` where the indices
+    /// of `faces` serve.
+    normal_of: Option<Option<Vec<[u32; 3]>>>,
+    uv_of: Option<Option<Vec<[u32; 3]>>>,
+}
+
+impl Arrays {
+    fn new(plan: &Plan) -> Self {
+        let triangles = plan.total.triangles as usize;
+        let values = |wanted: bool, components: u64| if wanted { vec![0.0; components as usize] } else { Vec::new() };
+        Self {
+            points: vec![0.0; 3 * plan.total.vertices as usize + 1],
+            faces: vec![[0; 3]; triangles],
+            normals: values(plan.normals, 3 * plan.total.normals),
+            uvs: values(plan.uv, 2 * plan.total.textures),
+            normal_of: plan.normals.then(|| Some(vec![[0; 3]; triangles])),
+            uv_of: plan.uv.then(|| Some(vec![[0; 3]; triangles])),
+        }
+    }
+
+    /// Each piece's part of everything.
+    fn targets(&mut self, surveys: &[Survey]) -> Vec<Target<'_>> {
+        fn parts<'a, T>(
+            all: &'a mut [T],
+            surveys: &[Survey],
+            length: impl Fn(&Tally) -> u64,
+        ) -> std::vec::IntoIter<&'a mut [T]> {
+            let wanted = !all.is_empty();
+            cut(all, surveys.iter().map(|s| if wanted { length(&s.tally) as usize } else { 0 })).into_iter()
+        }
+        let mut points = parts(&mut self.points, surveys, |t| 3 * t.vertices);
+        let mut normals = parts(&mut self.normals, surveys, |t| 3 * t.normals);
+        let mut uvs = parts(&mut self.uvs, surveys, |t| 2 * t.textures);
+        let mut faces = parts(&mut self.faces, surveys, |t| t.triangles);
+        let mut normal_of = parts(slots(&mut self.normal_of), surveys, |t| t.triangles);
+        let mut uv_of = parts(slots(&mut self.uv_of), surveys, |t| t.triangles);
+        let each = "there is a part for every piece";
+        (0..surveys.len())
+            .map(|_| Target {
+                points: points.next().expect(each),
+                normals: normals.next().expect(each),
+                uvs: uvs.next().expect(each),
+                faces: faces.next().expect(each),
+                normal_of: normal_of.next().expect(each),
+                uv_of: uv_of.next().expect(each),
+            })
+            .collect()
+    }
+
+    /// Turns the differences to vertex indices that were parsed into indices, where they
+    /// are needed at all.
+    fn settle_indices(&mut self, parsed: &[Parsed]) {
+        let used = |usage: fn(&Parsed) -> Usage| {
+            let all = parsed.iter().map(usage);
+            all.fold(Usage::default(), |a, b| Usage { any: a.any || b.any, own_index: a.own_index || b.own_index })
+        };
+        settle(&mut self.normal_of, &mut self.normals, used(|p| p.normals), &self.faces);
+        settle(&mut self.uv_of, &mut self.uvs, used(|p| p.uvs), &self.faces);
+    }
+}
+
+fn slots(of: &mut Option<Option<Vec<[u32; 3]>>>) -> &mut [[u32; 3]] {
+    of.as_mut().and_then(Option::as_deref_mut).unwrap_or_default()
+}
+
+fn settle(of: &mut Option<Option<Vec<[u32; 3]>>>, values: &mut Vec<f32>, usage: Usage, faces: &[[u32; 3]]) {
+    if !usage.any {
+        *of = None;
+        *values = Vec::new();
+    } else if !usage.own_index {
+        *of = of.is_some().then_some(None);
+    }
+    slots(of).par_iter_mut().zip(faces).for_each(|(differences, face)| {
+        for (d, v) in differences.iter_mut().zip(face) {
+            *d = d.wrapping_add(*v);
+        }
+    });
+}
+
+/// Everything must be countable by 32 bits, with one number to spare for "none".
+fn check_size(total: &Tally, pieces: &Pieces<'_>) -> Result<(), Error> {
+    const LIMIT: u64 = u32::MAX as u64 - 1;
+    let all = [
+        ("vertices", total.vertices),
+        ("texture coordinates", total.textures),
+        ("normals", total.normals),
+        ("triangles", total.triangles),
+    ];
+    match all.into_iter().find(|&(_, count)| count > LIMIT) {
+        Some((what, count)) => Err(Error::TooMany { path: pieces.source.path.clone(), what, count, limit: LIMIT }),
+        None => Ok(()),
+    }
+}
+
+/// Makes sure that the frame, which a sample of the vertices led to, suits all that faces
+/// use, and writes the points anew in another one if not. Returns the frame they are in.
+fn settle_frame(
+    pieces: &Pieces<'_>,
+    surveys: &[Survey],
+    arrays: &mut Arrays,
+    mut frame: Frame,
+    parsed: &[Parsed],
+) -> Result<Frame, Error> {
+    let mut reached = parsed.iter().map(|p| p.reach).fold(0.0, f64::max);
+    if FITTING.contains(&reached) {
+        return Ok(frame);
+    }
+    // Once for what the sample missed; more often only where a vertex that no face uses is
+    // so far away that what faces use can only be approached in steps.
+    loop {
+        let used = used_reach(&arrays.points, &arrays.faces).min(f64::from(f32::MAX));
+        let better = frame.rescaled(used);
+        if FITTING.contains(&used) || better == frame {
+            break;
+        }
+        frame = better;
+        let parts = cut(&mut arrays.points, surveys.iter().map(|s| 3 * s.tally.vertices as usize));
+        let all = pieces.each(parts, surveys, |_, points, text, _| parse::parse_points(text, &frame, points))?;
+        reached = all.into_iter().fold(0.0, f64::max);
+    }
+    if reached > f64::from(f32::MAX) {
+        // Only vertices that no face uses can be so far away.
+        arrays.points.par_iter_mut().for_each(|x| *x = x.clamp(-f32::MAX, f32::MAX));
+    }
+    Ok(frame)
+}
+
+/// Largest coordinate of the vertices that faces use.
+fn used_reach(points: &[f32], faces: &[[u32; 3]]) -> f64 {
+    let reach = |i: u32| points[3 * i as usize..][..3].iter().fold(0.0, |m: f32, x| m.max(x.abs()));
+    let largest = faces.par_iter().map(|f| f.iter().fold(0.0, |m: f32, &i| m.max(reach(i)))).reduce(|| 0.0, f32::max);
+    f64::from(largest)
+}
+
+/// Splits the polygons anew that a fan does not cover. Returns how many those are.
+fn split_polygons(arrays: &mut Arrays, surveys: &[Survey], parsed: &[Parsed]) -> u64 {
+    if parsed.iter().all(|p| p.continues.is_empty()) {
+        return 0;
+    }
+    let points = std::mem::take(&mut arrays.points);
+    let clipped = arrays
+        .targets_of_faces(surveys)
+        .into_par_iter()
+        .zip(parsed)
+        .map(|(mut target, found)| split_in_piece(&points, &mut target, found))
+        .sum();
+    arrays.points = points;
+    clipped
+}
+
+/// A piece's part of the arrays that have an entry per triangle.
+struct FaceTarget<'a> {
+    faces: &'a mut [[u32; 3]],
+    others: [&'a mut [[u32; 3]]; 2],
+}
+
+impl Arrays {
+    fn targets_of_faces(&mut self, surveys: &[Survey]) -> Vec<FaceTarget<'_>> {
+        self.targets(surveys)
+            .into_iter()
+            .map(|t| FaceTarget { faces: t.faces, others: [t.normal_of, t.uv_of] })
+            .collect()
+    }
+}
+
+fn split_in_piece(points: &[f32], target: &mut FaceTarget<'_>, found: &Parsed) -> u64 {
+    if found.continues.is_empty() {
+        return 0;
+    }
+    let (mut clipped, mut corners) = (0, Vec::new());
+    let mut first = 0;
+    while first < target.faces.len() {
+        let more = (first + 1..target.faces.len()).take_while(|&t| found.continues(t)).count();
+        let polygon = first..first + more + 1;
+        first = polygon.end;
+        if more == 0 {
+            continue;
+        }
+        corners.clear();
+        let fan = &target.faces[polygon.clone()];
+        corners.extend(fan_corners(fan).map(|i| Vec3::from_slice(&points[3 * i as usize..])));
+        if let Some(triangles) = polygon::split(&corners) {
+            clipped += 1;
+            for all in std::iter::once(&mut *target.faces).chain(target.others.iter_mut().map(|o| &mut **o)) {
+                if let Some(fan) = all.get_mut(polygon.clone()) {
+                    rewrite(fan, &triangles);
+                }
+            }
+        }
+    }
+    clipped
+}
+
+/// The corners of the polygon that a fan was made of.
+fn fan_corners(fan: &[[u32; 3]]) -> impl Iterator<Item = u32> {
+    fan[0][..2].iter().copied().chain(fan.iter().map(|t| t[2]))
+}
+
+/// Replaces a fan by `triangles` over its corners.
+fn rewrite(fan: &mut [[u32; 3]], triangles: &[[u32; 3]]) {
+    let corners: Vec<u32> = fan_corners(fan).collect();
+    for (slot, t) in fan.iter_mut().zip(triangles) {
+        *slot = t.map(|k| corners[k as usize]);
+    }
+}
+
+fn gather(surveys: &mut [Survey], parsed: &mut [Parsed]) -> Notes {
+    let mut notes = Notes::default();
+    for s in surveys {
+        notes.append(std::mem::take(&mut s.notes));
+    }
+    for p in parsed {
+        notes.append(std::mem::take(&mut p.notes));
+    }
+    notes
+}
+
+fn counts(total: &Tally, clipped: u64, notes: &Notes) -> Counts {
+    Counts {
+        vertices: total.vertices,
+        textures: total.textures,
+        normals: total.normals,
+        polygons: total.polygons,
+        triangles: total.triangles,
+        clipped,
+        short_faces: notes.count(Kind::ShortFace),
+        objects: total.objects,
+        groups: total.groups,
+        polylines: notes.count(Kind::Polyline),
+        points: notes.count(Kind::PointElement),
+        unused_materials: 0,
+    }
+}
+
+/// `mtllib` statements, each argument once.
+fn statements(pieces: &Pieces<'_>, surveys: &[Survey]) -> Result<Vec<LibraryStatement>, Error> {
+    let mut known = std::collections::BTreeSet::new();
+    surveys
+        .iter()
+        .flat_map(|s| &s.libraries)
+        .filter(|(_, argument)| known.insert(&**argument))
+        .map(|(offset, argument)| {
+            let (line, _) = pieces.place(*offset, surveys)?;
+            Ok(LibraryStatement { line, argument: argument.clone() })
+        })
+        .collect()
+}
+
+/// Says what there is instead of faces.
+fn no_faces(pieces: &Pieces<'_>, surveys: &[Survey], total: &Tally) -> Result<Error, Error> {
+    let source = pieces.source;
+    let count = |kind| surveys.iter().map(|s| s.notes.count(kind)).sum::<u64>();
+    let (lines, points) = (count(Kind::Polyline), count(Kind::PointElement));
+    let why = if source.len == 0 {
+        "the file is empty".into()
+    } else if total.polygons > 0 {
+        "no face has three corners".into()
+    } else if lines + points > 0 {
+        format!("it has {lines} lines and {points} points, which are not rendered")
+    } else if total.vertices > 0 {
+        format!("it has {} vertices and no 'f' line", total.vertices)
+    } else if count(Kind::WrongCase) > 0 {
+        "keywords must be written in lower case, 'v' and 'f'".into()
+    } else if source.looks_binary()? {
+        "it looks like a binary file, not like OBJ text".into()
+    } else {
+        "it has no 'v' and no 'f' line; is it an OBJ file?".into()
+    };
+    Ok(Error::NoFaces { path: source.path.clone(), why })
+}

@@ -1,0 +1,318 @@
+//! Rate of rays inside `render` against a bare Embree loop that traces the very same rays in
+//! the very same packets and does nothing else. Both run in turn in one process, with the
+//! same build quality, ROBUST, on the same threads.
+//!
+//!     cargo bench --bench bare -- [MODEL.obj] [--size WxH] [--eye x,y,z] [--target x,y,z]
+//!                                 [--fov D] [--threads N] [--rounds N] [--triangles N]
+//!
+//! Without a model a displaced sphere is generated. The loop's time is that of the calls into
+//! Embree alone: packets are put into the cache before each tile's clock starts.
+use embree4_sys as sys;
+use glam::DVec3;
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+use tison::backend::{AnyBackend, Backend, BackendKind, BuildOptions};
+use tison::geom::{Coherence, Hit, LANES, PacketBatch, Ray, RayHitPacket, RayPacket, RayQueue};
+use tison::render::{self, Control, Crop, Job};
+use tison::scene::{self, CameraOverrides, LoadOptions, Projection, Scene, View};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let args = Args::parse()?;
+    let threads = args.threads;
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+    let model = args.model()?;
+    let cancel = AtomicBool::new(false);
+    let options = LoadOptions { smooth: None, allow: vec![], cancel: &cancel, progress: None };
+    let mut scene = scene::load(&model, &options)?.scene;
+    let aspect = f64::from(args.size.0) / f64::from(args.size.1);
+    let camera = scene.auto_camera(View::ThreeQuarter, &args.camera, aspect)?;
+    scene.light_from(&camera);
+    let job = Job {
+        size: args.size,
+        crop: Crop { x0: 0, y0: 0, x1: args.size.0, y1: args.size.1 },
+        spp: 1,
+        seed: 0,
+        k_max: 0,
+        min_weight: 0.0,
+        centre: false,
+        aovs: vec![],
+    };
+    let build = BuildOptions {
+        threads,
+        rays_expected: 3 * u64::from(args.size.0) * u64::from(args.size.1),
+        cancel: &cancel,
+        progress: None,
+    };
+    let low = build.prefers_quick_build(&scene);
+    let backend = AnyBackend::build(BackendKind::Embree, &scene, &build)?;
+    let AnyBackend::Embree(embree) = &backend else { unreachable!("it was asked for") };
+    let recorder = Recorder { inner: embree, tape: Mutex::default() };
+    render::run_with(&scene, &camera, &recorder, &job, &Control::default())?;
+    let tape = recorder.tape.into_inner()?;
+    let rays: usize = tape.iter().map(Recording::rays).sum();
+    let raw = RawScene::build(&scene, threads, low);
+
+    println!("{} triangles, {rays} rays in {} batches, {threads} threads, {}", scene.counts().triangles, tape.len(), backend.details());
+    println!("round   render Mrays/s   bare Mrays/s   ratio");
+    let mut ratios = Vec::new();
+    let (mut best_render, mut best_bare) = (0f64, 0f64);
+    for round in 0..=args.rounds {
+        let outcome = render::run(&scene, &camera, &backend, &job, &Control::default())?;
+        assert_eq!(outcome.stats.rays.total() as usize, rays, "both trace the same rays");
+        let bare = rays as f64 / raw.replay(&tape, threads).as_secs_f64() / 1e6;
+        let ours = rays as f64 / outcome.stats.seconds / 1e6;
+        if round == 0 {
+            continue; // warms the caches
+        }
+        println!("{round:5} {ours:16.2} {bare:14.2} {:7.3}", ours / bare);
+        ratios.push(ours / bare);
+        best_render = best_render.max(ours);
+        best_bare = best_bare.max(bare);
+    }
+    ratios.sort_by(f64::total_cmp);
+    println!("median of ratios {:.3}; best render {best_render:.2}, best bare {best_bare:.2} Mrays/s", ratios[ratios.len() / 2]);
+    Ok(())
+}
+
+struct Args {
+    model: Option<PathBuf>,
+    triangles: u64,
+    size: (u32, u32),
+    camera: CameraOverrides,
+    threads: usize,
+    rounds: usize,
+}
+
+impl Args {
+    fn parse() -> Result<Self, Box<dyn std::error::Error>> {
+        let mut out = Self {
+            model: None,
+            triangles: 1_310_720,
+            size: (1920, 1080),
+            camera: CameraOverrides::default(),
+            threads: std::thread::available_parallelism().map_or(1, usize::from),
+            rounds: 7,
+        };
+        let mut args = std::env::args().skip(1).filter(|a| a != "--bench");
+        while let Some(arg) = args.next() {
+            let mut value = || args.next().ok_or(format!("{arg} needs a value"));
+            match arg.as_str() {
+                "--size" => {
+                    let text = value()?;
+                    let (w, h) = text.split_once('x').ok_or("--size WxH")?;
+                    out.size = (w.parse()?, h.parse()?);
+                }
+                "--eye" => out.camera.eye = Some(point(&value()?)?),
+                "--target" => out.camera.target = Some(point(&value()?)?),
+                "--fov" => out.camera.projection = Some(Projection::Perspective { fov_deg: value()?.parse()? }),
+                "--threads" => out.threads = value()?.parse()?,
+                "--rounds" => out.rounds = value()?.parse()?,
+                "--triangles" => out.triangles = value()?.parse()?,
+                flag if flag.starts_with('-') => return Err(format!("unknown flag {flag}").into()),
+                model => out.model = Some(model.into()),
+            }
+        }
+        Ok(out)
+    }
+
+    /// The model asked for, or a generated one.
+    fn model(&self) -> std::io::Result<PathBuf> {
+        if let Some(model) = &self.model {
+            return Ok(model.clone());
+        }
+        let path = std::env::temp_dir().join(format!("tison-bench-{}.obj", self.triangles));
+        scene::example::write_mesh(self.triangles, &mut std::fs::File::create(&path)?)?;
+        Ok(path)
+    }
+}
+
+fn point(text: &str) -> Result<DVec3, Box<dyn std::error::Error>> {
+    let v = text.split(',').map(str::parse).collect::<Result<Vec<f64>, _>>()?;
+    let v: [f64; 3] = v.try_into().map_err(|_| "a point is x,y,z")?;
+    Ok(DVec3::from(v))
+}
+
+/// A batch as it reached the backend.
+enum Recording {
+    Nearest(PacketBatch<RayHitPacket>),
+    Any(PacketBatch<RayPacket>),
+}
+
+impl Recording {
+    fn rays(&self) -> usize {
+        match self {
+            Self::Nearest(b) => b.len(),
+            Self::Any(b) => b.len(),
+        }
+    }
+}
+
+/// Answers through another backend and keeps a copy of every question.
+struct Recorder<'a, B> {
+    inner: &'a B,
+    tape: Mutex<Vec<Recording>>,
+}
+
+impl<B: Backend> Backend for Recorder<'_, B> {
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        self.inner.intersect(ray)
+    }
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.inner.occluded(ray)
+    }
+    fn intersect_many(&self, rays: &mut PacketBatch<RayHitPacket>, coherence: Coherence) {
+        self.tape.lock().expect("nobody panics with it").push(Recording::Nearest(rays.clone()));
+        self.inner.intersect_many(rays, coherence);
+    }
+    fn occluded_many(&self, rays: &mut PacketBatch<RayPacket>, coherence: Coherence) {
+        self.tape.lock().expect("nobody panics with it").push(Recording::Any(rays.clone()));
+        self.inner.occluded_many(rays, coherence);
+    }
+}
+
+/// Embree's scene, made and asked through nothing but the bindings.
+struct RawScene {
+    device: sys::RTCDevice,
+    scene: sys::RTCScene,
+}
+
+// SAFETY: Embree allows concurrent queries on a committed scene.
+unsafe impl Sync for RawScene {}
+
+impl RawScene {
+    fn build(scene: &Scene, threads: usize, low: bool) -> Self {
+        let quality = if low {
+            sys::RTCBuildQuality::RTC_BUILD_QUALITY_LOW
+        } else {
+            sys::RTCBuildQuality::RTC_BUILD_QUALITY_MEDIUM
+        };
+        let config = std::ffi::CString::new(format!("threads={threads}")).expect("no NUL in it");
+        // SAFETY: a NUL-terminated string.
+        let device = unsafe { sys::rtcNewDevice(config.as_ptr()) };
+        // SAFETY: the device is live.
+        let raw = unsafe { sys::rtcNewScene(device) };
+        // SAFETY: the scene is live.
+        unsafe { sys::rtcSetSceneFlags(raw, sys::RTCSceneFlags::RTC_SCENE_FLAG_ROBUST) };
+        // SAFETY: the scene is live.
+        unsafe { sys::rtcSetSceneBuildQuality(raw, quality) };
+        for object in &scene.objects {
+            Self::attach(device, raw, &object.mesh, quality);
+        }
+        // SAFETY: the scene is live and nobody else has it.
+        unsafe { sys::rtcCommitScene(raw) };
+        Self { device, scene: raw }
+    }
+
+    /// Copies the mesh into buffers of Embree's own.
+    fn attach(device: sys::RTCDevice, scene: sys::RTCScene, mesh: &tison::geom::TriangleMesh, quality: sys::RTCBuildQuality) {
+        // SAFETY: the device is live.
+        let geometry = unsafe { sys::rtcNewGeometry(device, sys::RTCGeometryType::RTC_GEOMETRY_TYPE_TRIANGLE) };
+        // SAFETY: the geometry is live.
+        unsafe { sys::rtcSetGeometryBuildQuality(geometry, quality) };
+        let points = &mesh.padded_points()[..3 * mesh.vertex_count()];
+        let vertex = (sys::RTCBufferType::RTC_BUFFER_TYPE_VERTEX, sys::RTCFormat::RTC_FORMAT_FLOAT3);
+        // SAFETY: the geometry is live; Embree allocates and pads.
+        let to = unsafe { sys::rtcSetNewGeometryBuffer(geometry, vertex.0, 0, vertex.1, 12, mesh.vertex_count()) };
+        // SAFETY: the buffer holds as many floats as `points`.
+        unsafe { std::ptr::copy_nonoverlapping(points.as_ptr(), to.cast(), points.len()) };
+        let faces = mesh.faces();
+        let index = (sys::RTCBufferType::RTC_BUFFER_TYPE_INDEX, sys::RTCFormat::RTC_FORMAT_UINT3);
+        // SAFETY: as above.
+        let to = unsafe { sys::rtcSetNewGeometryBuffer(geometry, index.0, 0, index.1, 12, faces.len()) };
+        // SAFETY: the buffer holds as many triples as `faces`.
+        unsafe { std::ptr::copy_nonoverlapping(faces.as_ptr(), to.cast(), faces.len()) };
+        // SAFETY: the geometry is live.
+        unsafe { sys::rtcCommitGeometry(geometry) };
+        // SAFETY: both are live; the scene takes a reference of its own.
+        unsafe { sys::rtcAttachGeometry(scene, geometry) };
+        // SAFETY: gives back ours.
+        unsafe { sys::rtcReleaseGeometry(geometry) };
+    }
+
+    /// Traces the tape; the time of the thread that spent most in Embree.
+    fn replay(&self, tape: &[Recording], threads: usize) -> Duration {
+        let next = AtomicUsize::new(0);
+        let spent = rayon::broadcast(|_| {
+            let (mut nearest, mut any) = (PacketBatch::default(), PacketBatch::default());
+            let mut spent = Duration::ZERO;
+            while let Some(recording) = tape.get(next.fetch_add(1, Relaxed)) {
+                spent += match recording {
+                    Recording::Nearest(b) => self.timed(b, &mut nearest, Self::intersect),
+                    Recording::Any(b) => self.timed(b, &mut any, Self::occluded),
+                };
+            }
+            spent
+        });
+        // Work is handed out in small pieces, so all end together: the mean is the wall time.
+        spent.iter().sum::<Duration>() / threads as u32
+    }
+
+    fn timed<P: RayQueue>(&self, from: &PacketBatch<P>, to: &mut PacketBatch<P>, call: fn(&Self, &mut P, usize)) -> Duration {
+        to.clone_from(from);
+        let started = Instant::now();
+        for (packet, live) in to.packets_mut() {
+            call(self, packet, live);
+        }
+        started.elapsed()
+    }
+
+    fn intersect(&self, packet: &mut RayHitPacket, live: usize) {
+        let mut args = ARGS_INTERSECT;
+        let packet: *mut RayHitPacket = packet;
+        // SAFETY: the scene is committed; mask and packet are 64-byte aligned and laid out as
+        // Embree's own (the library asserts that); the packet is ours alone.
+        unsafe { sys::rtcIntersect16(VALID[live].0.as_ptr(), self.scene, packet.cast(), &mut args) };
+    }
+
+    fn occluded(&self, packet: &mut RayPacket, live: usize) {
+        let mut args = ARGS_OCCLUDED;
+        let packet: *mut RayPacket = packet;
+        // SAFETY: as above.
+        unsafe { sys::rtcOccluded16(VALID[live].0.as_ptr(), self.scene, packet.cast(), &mut args) };
+    }
+}
+
+impl Drop for RawScene {
+    fn drop(&mut self) {
+        // SAFETY: gives back the reference `rtcNewScene` gave.
+        unsafe { sys::rtcReleaseScene(self.scene) };
+        // SAFETY: gives back the reference `rtcNewDevice` gave.
+        unsafe { sys::rtcReleaseDevice(self.device) };
+    }
+}
+
+#[repr(align(64))]
+struct Valid([i32; LANES]);
+
+/// Masks for the first `n` lanes.
+static VALID: [Valid; LANES + 1] = {
+    let mut all = [const { Valid([0; LANES]) }; LANES + 1];
+    let mut n = 0;
+    while n <= LANES {
+        let mut lane = 0;
+        while lane < n {
+            all[n].0[lane] = -1;
+            lane += 1;
+        }
+        n += 1;
+    }
+    all
+};
+
+const ARGS_INTERSECT: sys::RTCIntersectArguments = sys::RTCIntersectArguments {
+    flags: sys::RTCRayQueryFlags::RTC_RAY_QUERY_FLAG_COHERENT,
+    feature_mask: sys::RTCFeatureFlags::RTC_FEATURE_FLAG_ALL,
+    context: std::ptr::null_mut(),
+    filter: None,
+    intersect: None,
+};
+
+const ARGS_OCCLUDED: sys::RTCOccludedArguments = sys::RTCOccludedArguments {
+    flags: sys::RTCRayQueryFlags::RTC_RAY_QUERY_FLAG_COHERENT,
+    feature_mask: sys::RTCFeatureFlags::RTC_FEATURE_FLAG_ALL,
+    context: std::ptr::null_mut(),
+    filter: None,
+    occluded: None,
+};
