@@ -17,6 +17,9 @@ use glam::Vec4;
 /// So few rays go on alone.
 const FEW: u32 = 2;
 
+/// So many rays are worth being taken together.
+const ENOUGH: usize = LANES / 2;
+
 /// Registers of four lanes that hold one number of each ray.
 const GROUPS: usize = LANES / WIDTH;
 
@@ -136,22 +139,23 @@ struct Beam {
 }
 
 impl Beam {
-    /// `None` unless there are sixteen rays that meet the same sides of boxes first, none
-    /// of them parallel to a side, and count `t` alike.
+    /// `None` unless most lanes hold a ray, and all of those meet the same sides of boxes
+    /// first, run parallel to none, and count `t` alike.
     fn new(walks: &[Option<Walk>]) -> Option<Self> {
-        let first = &walks.first()?.as_ref()?.boxes;
-        let alike = |walk: &Option<Walk>| walk.as_ref().is_some_and(|w| w.boxes.is_like(first));
-        if walks.len() != LANES || !walks.iter().all(alike) {
+        let first = &walks.iter().flatten().next()?.boxes;
+        if walks.iter().flatten().count() < ENOUGH || !walks.iter().flatten().all(|w| w.boxes.is_like(first)) {
             return None;
         }
-        let lane = |i: usize| walks[i].as_ref().map_or(first, |w| &w.boxes);
+        // A lane without a ray repeats the first one, but ends before it begins.
+        let walk = |i: usize| walks.get(i).and_then(Option::as_ref);
+        let lane = |i: usize| walk(i).map_or(first, |w| &w.boxes);
         let gather = |f: &dyn Fn(&BoxRay) -> f32| -> [Vec4; GROUPS] {
             array::from_fn(|g| Vec4::from_array(array::from_fn(|i| f(lane(g * WIDTH + i)))))
         };
         let o = array::from_fn(|axis| gather(&|b| b.o[axis]));
         let inv_d = array::from_fn(|axis| gather(&|b| b.inv_d[axis]));
         let t_near = gather(&|b| b.t_near);
-        let culls = |i: usize| walks[i].as_ref().map_or(f32::NEG_INFINITY, |w| w.cull);
+        let culls = |i: usize| walk(i).map_or(f32::NEG_INFINITY, |w| w.cull);
         let cull = array::from_fn(|g| Vec4::from_array(array::from_fn(|i| culls(g * WIDTH + i))));
         let near = first.near.map(usize::from);
         let ends = |axis: usize| [least(&o[axis]), most(&o[axis])].map(Vec4::splat);

@@ -42,11 +42,12 @@ pub(super) struct TriangleRay {
     shear: [f32; 2],
 }
 
-/// Prepares `ray`; `None` where it has no direction or is not finite, and meets nothing.
+/// Prepares `ray`; `None` where it meets nothing because it has no direction, is not finite
+/// or ends before it begins.
 pub(super) fn prepare(ray: &Ray) -> Option<(BoxRay, TriangleRay)> {
     let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
     let longest = d.abs().max_element();
-    if !(o.is_finite() && d.is_finite() && longest > 0.0) {
+    if !(o.is_finite() && d.is_finite() && longest > 0.0 && ray.t_near < ray.t_far) {
         return None;
     }
     // The power of two at or below the largest component: scaling by it is exact.

@@ -70,7 +70,7 @@ impl Bvh {
 }
 
 impl Walk {
-    /// `None` for a ray that meets nothing because it has no direction or is not finite.
+    /// `None` for a ray that meets nothing whatever there is.
     #[inline]
     pub(super) fn new(ray: &Ray) -> Option<Self> {
         let (boxes, triangles) = prepare(ray)?;
