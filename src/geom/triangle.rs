@@ -103,12 +103,22 @@ pub fn intersect_permuted(ray: &ShearedRay, p: [Vec3; 3]) -> Option<TriangleHit>
         return None;
     }
     let det = u + v + w;
-    if det == 0.0 {
+    if det == 0.0 || one_sided(a.x, b.x, c.x) || one_sided(a.y, b.y, c.y) {
         return None;
     }
     let t = (u * a.z + v * b.z + w * c.z) / det;
     // `!(..)` also turns NaN away.
     (t > ray.t_near && t < ray.t_far).then(|| TriangleHit { t, u: v / det, v: w / det })
+}
+
+/// Whether all three lie strictly on the same side of zero.
+///
+/// A triangle that holds the ray's line in its plane has edge functions that are nothing but
+/// rounding, and their signs may agree however far away it is. A point inside a triangle is
+/// never one-sided, so this costs no hit and no watertightness.
+#[inline]
+fn one_sided(a: f64, b: f64, c: f64) -> bool {
+    (a < 0.0 && b < 0.0 && c < 0.0) || (a > 0.0 && b > 0.0 && c > 0.0)
 }
 
 /// A reported hit, computed anew in f64.
@@ -200,6 +210,14 @@ mod tests {
                 assert!(hit, "spoke {i}, step {k}");
             }
         }
+    }
+
+    #[test]
+    fn a_triangle_far_beside_the_ray_is_not_hit_edge_on() {
+        // The ray lies in the triangle's plane, and 1/7 is not exact.
+        let p = [Vec3::new(1.0, -1.0, -2.0), Vec3::new(2.0, -4.0, 0.0), Vec3::new(1.0, -2.0, -1.0)];
+        let ray = Ray::new(Vec3::new(-3.0, -3.0, 4.0), Vec3::new(1.0, 6.0, -7.0));
+        assert_eq!(intersect(&ShearedRay::from(&ray), p), None);
     }
 
     #[test]
