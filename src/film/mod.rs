@@ -1,8 +1,14 @@
 //! Finished pixels and the files they go to. Knows `math` and nothing else.
 
 mod aov;
+mod format;
+mod save;
+mod write;
 
 pub use aov::{Aov, AovImage};
+pub use format::Format;
+pub use save::{SaveError, Sink, abandon, check_target, is_special_file, save};
+pub use write::{Notes, encode, files, save_all};
 
 /// A rendered image: linear colour and whatever else was asked for, row by row from the top.
 #[derive(Clone, Debug)]

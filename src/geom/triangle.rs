@@ -134,7 +134,7 @@ pub struct Refined {
     pub p: DVec3,
     /// Geometric normal as wound, `(p1 - p0) x (p2 - p0)`, not unit length.
     pub ng: DVec3,
-    /// Longest edge.
+    /// Size for offsets: at least the longest edge, at most √3 of it (its sum of components).
     pub extent: f64,
 }
 
@@ -162,13 +162,12 @@ pub fn refine(o: Vec3, d: Vec3, p: [Vec3; 3], reported: (f32, f32)) -> Refined {
         (u, v) = (f64::from(reported.0), f64::from(reported.1));
     }
     (u, v) = (u.clamp(0.0, 1.0), v.clamp(0.0, 1.0));
-    let sum = u + v;
-    if sum > 1.0 {
-        (u, v) = (u / sum, v / sum);
-    }
+    let shrink = 1.0 / (u + v).max(1.0);
+    (u, v) = (u * shrink, v * shrink);
     let point = p0 + u * e1 + v * e2;
     let t = (point - o).dot(d) / d.dot(d);
-    let extent = e1.length_squared().max(e2.length_squared()).max((p2 - p1).length_squared()).sqrt();
+    let sum = |e: DVec3| e.x.abs() + e.y.abs() + e.z.abs();
+    let extent = sum(e1).max(sum(e2)).max(sum(p2 - p1));
     Refined { t, u, v, p: point, ng, extent }
 }
 
@@ -188,7 +187,7 @@ mod tests {
             assert!((r.t - h.t).abs() < 1e-14 && (r.u - h.u).abs() < 1e-14 && (r.v - h.v).abs() < 1e-14);
             assert!((r.p - DVec3::new(0.5, 1.0, 0.0)).length() < 1e-14);
             assert_eq!(r.ng, DVec3::new(0.0, 0.0, 6.0));
-            assert_eq!(r.extent, 13f64.sqrt());
+            assert_eq!(r.extent, 5.0);
         }
     }
 

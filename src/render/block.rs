@@ -90,8 +90,6 @@ pub struct Block {
     pub specular: [F32; 3],
     /// Exponent of the material's highlight.
     pub shininess: F32,
-    /// Ray parameter.
-    pub t: F64,
     /// The point.
     pub p: [F64; 3],
     /// Unit geometric normal, turned to the side the ray came from.
@@ -157,7 +155,6 @@ impl Block {
         diffuse: [[0.0; LANES]; 3],
         specular: [[0.0; LANES]; 3],
         shininess: [0.0; LANES],
-        t: [0.0; LANES],
         p: [[0.0; LANES]; 3],
         ng: [[0.0; LANES]; 3],
         ns: [[0.0; LANES]; 3],
@@ -237,7 +234,6 @@ impl Kernel for Finish<'_> {
 /// Between the steps.
 #[repr(align(64))]
 struct Refined {
-    t: F64,
     weights: [F64; 3],
     p: [F64; 3],
     ng: [F64; 3],
@@ -251,7 +247,6 @@ struct Refined {
 
 impl Refined {
     const EMPTY: Self = Self {
-        t: [0.0; LANES],
         weights: [[0.0; LANES]; 3],
         p: [[0.0; LANES]; 3],
         ng: [[0.0; LANES]; 3],
@@ -322,11 +317,9 @@ fn refine(f: &Facets, out: &mut Refined) {
         let v = if good { v } else { f64::from(f.reported[1][i]) };
         // The backend has decided that it is a hit: rounding never makes it a miss.
         let (u, v) = (u.clamp(0.0, 1.0), v.clamp(0.0, 1.0));
-        let over = (u + v).max(1.0);
-        let (u, v) = (u / over, v / over);
+        let shrink = 1.0 / (u + v).max(1.0);
+        let (u, v) = (u * shrink, v * shrink);
         let p = [0, 1, 2].map(|k| p0[k] + u * e1[k] + v * e2[k]);
-        let d2 = dot(d, d);
-        out.t[i] = dot(sub(p, o), d) / d2;
         let side = if along < 0.0 { 1.0 } else { -1.0 };
         out.side[i] = side;
         let unit = scale(ng, side / dot(ng, ng).sqrt());
@@ -335,11 +328,13 @@ fn refine(f: &Facets, out: &mut Refined) {
         out.weights[0][i] = 1.0 - u - v;
         out.weights[1][i] = u;
         out.weights[2][i] = v;
-        let e3 = sub(e2, e1);
-        out.extent[i] = dot(e1, e1).max(dot(e2, e2)).max(dot(e3, e3)).sqrt();
-        let back = -1.0 / d2.sqrt();
+        let e3 = sub(wide(&f.corners[2], i), wide(&f.corners[1], i));
+        let size = |e: V| e[0].abs() + e[1].abs() + e[2].abs();
+        out.extent[i] = size(e1).max(size(e2)).max(size(e3));
+        let d = [f.d[0][i], f.d[1][i], f.d[2][i]];
+        let back = -1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
         for k in 0..3 {
-            out.to_eye[k][i] = (d[k] * back) as f32;
+            out.to_eye[k][i] = d[k] * back;
         }
     }
 }
@@ -394,7 +389,6 @@ fn leave(r: &Refined, b: &mut Block) {
         }
         b.entering[i] = r.side[i] > 0.0;
     }
-    b.t = r.t;
     b.p = r.p;
     b.ng = r.ng;
     b.ns = r.ns;
@@ -463,7 +457,6 @@ mod tests {
                 let mut block = Block::EMPTY;
                 simd::run_at(level, Finish { facets: &facets, block: &mut block });
                 for lane in [0, 7, 15] {
-                    prop_assert_eq!(block.t[lane], want.t);
                     prop_assert_eq!(Block::dvec3(&block.p, lane), want.p);
                     prop_assert_eq!(block.extent[lane], want.extent);
                     prop_assert_eq!(block.entering[lane], side > 0.0);

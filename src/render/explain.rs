@@ -84,7 +84,7 @@ impl<B: Backend> Teller<'_, B> {
         let point = SurfacePoint::of_lane(&block, 0);
         let m = &self.scene.materials[point.material];
         let p = self.scene.frame.to_world(point.p);
-        let far = point.t * this.ray.d.as_dvec3().length() * self.scene.frame.world_per_local();
+        let far = (point.p - this.ray.o.as_dvec3()).length() * self.scene.frame.world_per_local();
         *out += &format!(
             "{indent}{} weight {weight:.4}: object {} triangle {} '{}' at {:.9} {:.9} {:.9}, distance {far:.9}, normal {:.6} {:.6} {:.6}, {}\n",
             this.what, hit.geom_id, hit.prim_id, m.name, p.x, p.y, p.z, point.ns.x, point.ns.y, point.ns.z,

@@ -80,19 +80,24 @@ impl<const SPECULAR: bool> Kernel for Add<'_, SPECULAR> {
     fn run(self) {
         let (b, p) = (self.block, self.packet);
         let (mut diffuse, mut specular) = ([0f32; LANES], [0f32; LANES]);
+        let mut visible = [0f32; LANES];
+        let mut cos_h = [0f64; LANES];
         for i in 0..LANES {
-            let d = [f64::from(p.d_x[i]), f64::from(p.d_y[i]), f64::from(p.d_z[i])];
+            let d = [p.d_x[i], p.d_y[i], p.d_z[i]];
             let inv = 1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-            let n = [b.ns[0][i], b.ns[1][i], b.ns[2][i]];
-            let visible = p.t_far[i] != f32::NEG_INFINITY;
-            let cos = (n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) * inv;
-            diffuse[i] = if visible { cos.max(0.0) as f32 } else { 0.0 };
+            let n = [b.ns[0][i] as f32, b.ns[1][i] as f32, b.ns[2][i] as f32];
+            visible[i] = if p.t_far[i] != f32::NEG_INFINITY { 1.0 } else { 0.0 };
+            diffuse[i] = visible[i] * ((n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) * inv).max(0.0);
             if SPECULAR {
-                let h = [0, 1, 2].map(|k| d[k] * inv + f64::from(b.to_eye[k][i]));
-                let length = (h[0] * h[0] + h[1] * h[1] + h[2] * h[2]).sqrt().max(1e-30);
-                let cos = (n[0] * h[0] + n[1] * h[1] + n[2] * h[2]) / length;
-                let power = pow01(cos.clamp(0.0, 1.0), f64::from(b.shininess[i])) as f32;
-                specular[i] = if visible { power } else { 0.0 };
+                let h = [0, 1, 2].map(|k| d[k] * inv + b.to_eye[k][i]);
+                let inv = 1.0 / (h[0] * h[0] + h[1] * h[1] + h[2] * h[2]).sqrt().max(1e-15);
+                cos_h[i] = f64::from(((n[0] * h[0] + n[1] * h[1] + n[2] * h[2]) * inv).clamp(0.0, 1.0));
+            }
+        }
+        if SPECULAR {
+            let power: [f64; LANES] = powers(&cos_h, &b.shininess);
+            for i in 0..LANES {
+                specular[i] = visible[i] * power[i] as f32;
             }
         }
         for k in 0..3 {
@@ -103,6 +108,16 @@ impl<const SPECULAR: bool> Kernel for Add<'_, SPECULAR> {
             }
         }
     }
+}
+
+/// Of every lane, lit or not: a choice in between would keep the loop from being vector code.
+#[inline(always)]
+fn powers(cos: &[f64; LANES], shininess: &F32) -> [f64; LANES] {
+    let mut power = [0.0; LANES];
+    for i in 0..LANES {
+        power[i] = pow01(cos[i], f64::from(shininess[i]));
+    }
+    power
 }
 
 #[cfg(test)]

@@ -23,6 +23,7 @@ use glam::{DVec3, Vec3};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
+use surface::SurfacePoint;
 use wave::{Tally, Waves};
 
 /// Renders on the current rayon pool. The same scene, job and backend give the same bytes,
@@ -143,14 +144,21 @@ struct TileWorker<'a, B, const SECONDARY: bool> {
     batch: PacketBatch<RayHitPacket>,
     pixels: Vec<(u32, u32)>,
     sums: Vec<PixelSum>,
+    /// One per pixel; empty unless auxiliary images are wanted.
+    first_hits: Vec<FirstHits>,
 }
 
 /// A pixel while its samples come in.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 struct PixelSum {
     color: DVec3,
     cut: f64,
     counted: u32,
+}
+
+/// What the auxiliary images show of a pixel, while its samples come in.
+#[derive(Clone, Copy, Debug, Default)]
+struct FirstHits {
     hits: u32,
     depth: f64,
     normal: DVec3,
@@ -162,21 +170,31 @@ struct PixelSum {
 impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
     fn new(render: &'a Render<'a, B, SECONDARY>, radiance: &'a Radiance) -> Self {
         let waves = Waves::new(render.scene, render.backend, render.job, &render.needs, radiance);
-        Self { render, waves, batch: PacketBatch::default(), pixels: Vec::new(), sums: Vec::new() }
+        Self {
+            render,
+            waves,
+            batch: PacketBatch::default(),
+            pixels: Vec::new(),
+            sums: Vec::new(),
+            first_hits: Vec::new(),
+        }
     }
 
     fn render(&mut self, tile: Crop) {
         let Render { camera, job, control, .. } = self.render;
-        self.pixels = tile::pixels(tile);
+        tile::pixels(tile, &mut self.pixels);
         self.sums.clear();
         self.sums.resize(self.pixels.len(), PixelSum::default());
-        let coherence = Coherence::Coherent;
+        self.first_hits.clear();
+        if !job.aovs.is_empty() {
+            self.first_hits.resize(self.pixels.len(), FirstHits::default());
+        }
         let pixels = std::mem::take(&mut self.pixels);
         let mut first_pixel = 0;
         for segment in tile::segments(&pixels, job.spp) {
             let before = self.waves.tally.rays.total();
             segment.camera_rays(camera, job, &mut self.batch);
-            self.waves.trace(&mut self.batch, coherence);
+            self.waves.trace(&mut self.batch, Coherence::Coherent);
             self.add_up(first_pixel, &segment);
             if segment.first + segment.samples == job.spp {
                 first_pixel += segment.pixels.len();
@@ -189,38 +207,42 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
     /// Adds the samples of a segment to their pixels, in order.
     fn add_up(&mut self, first_pixel: usize, segment: &tile::Segment<'_>) {
         let samples = segment.samples as usize;
-        for (slot, color) in self.waves.gathered.color.iter().enumerate() {
-            let sum = &mut self.sums[first_pixel + slot / samples];
-            let color = color.as_vec3();
-            if color.is_finite() {
-                sum.color += color.as_dvec3();
-                sum.counted += 1;
+        let gathered = &self.waves.gathered;
+        for (sum, colors) in self.sums[first_pixel..].iter_mut().zip(gathered.color.chunks_exact(samples)) {
+            for color in colors.iter().map(|c| c.as_vec3()) {
+                if color.is_finite() {
+                    sum.color += color.as_dvec3();
+                    sum.counted += 1;
+                }
             }
-            sum.cut += self.waves.gathered.cut[slot];
         }
-        if let Some(cost) = &self.waves.gathered.cost {
-            cost.iter().enumerate().for_each(|(slot, c)| self.sums[first_pixel + slot / samples].cost += c);
+        if SECONDARY {
+            for (sum, cuts) in self.sums[first_pixel..].iter_mut().zip(gathered.cut.chunks_exact(samples)) {
+                sum.cut += cuts.iter().sum::<f64>();
+            }
         }
-        if self.render.job.aovs.iter().any(|&a| a != Aov::Cost) {
+        if !self.first_hits.is_empty() {
             self.first_hits(first_pixel, segment);
         }
     }
 
     /// What the auxiliary images show of the camera rays' hits.
     fn first_hits(&mut self, first_pixel: usize, segment: &tile::Segment<'_>) {
-        let samples = segment.samples as usize;
-        let scene = self.render.scene;
+        let (scene, samples) = (self.render.scene, segment.samples as usize);
         for slot in 0..self.batch.len() {
+            let sum = &mut self.first_hits[first_pixel + slot / samples];
+            if let Some(cost) = &self.waves.gathered.cost {
+                sum.cost += cost[slot];
+            }
             let (packet, lane) = (&self.batch.packets()[slot / LANES], slot % LANES);
             let Some(hit) = packet.hit(lane) else { continue };
             let ray = packet.ray.get(lane);
-            let point = surface::SurfacePoint::new(scene, &ray, &hit);
-            let sum = &mut self.sums[first_pixel + slot / samples];
+            let point = SurfacePoint::new(scene, &ray, &hit);
             if slot % samples == 0 && segment.first == 0 {
                 sum.id = [hit.geom_id + 1, hit.prim_id + 1];
             }
             sum.hits += 1;
-            sum.depth += point.t * ray.d.as_dvec3().length() * scene.frame.world_per_local();
+            sum.depth += (point.p - ray.o.as_dvec3()).length() * scene.frame.world_per_local();
             sum.normal += point.ns;
             sum.albedo += scene.materials[point.material].diffuse;
         }
@@ -230,17 +252,17 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
     fn hand_in(&self, tile: Crop, index: usize, sum: &mut Sum) {
         let (crop, spp) = (self.render.job.crop, self.render.job.spp);
         let width = sum.film.width as usize;
-        for (&(x, y), pixel) in self.pixels.iter().zip(&self.sums) {
-            let at = (y - crop.y0) as usize * width + (x - crop.x0) as usize;
+        let at = |(x, y): (u32, u32)| (y - crop.y0) as usize * width + (x - crop.x0) as usize;
+        for (&xy, pixel) in self.pixels.iter().zip(&self.sums) {
             let color = pixel.color / f64::from(pixel.counted.max(1));
-            sum.film.color[at] = color.as_vec3().to_array();
+            sum.film.color[at(xy)] = color.as_vec3().to_array();
             sum.non_finite += u64::from(spp - pixel.counted);
             let cut = pixel.cut / f64::from(spp);
             sum.cut_max = sum.cut_max.max(cut);
             sum.cut_of_tile[index] += cut;
-            for image in &mut sum.film.aovs {
-                pixel.write(image, at, spp);
-            }
+        }
+        for (&xy, pixel) in self.pixels.iter().zip(&self.first_hits) {
+            sum.film.aovs.iter_mut().for_each(|image| pixel.write(image, at(xy), spp));
         }
         let pixels = self.pixels.len();
         debug_assert_eq!(pixels, ((tile.x1 - tile.x0) * (tile.y1 - tile.y0)) as usize);
@@ -249,7 +271,7 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
     }
 }
 
-impl PixelSum {
+impl FirstHits {
     fn write(&self, image: &mut AovImage, at: usize, spp: u32) {
         let hits = f64::from(self.hits.max(1));
         let set = |data: &mut [f32], values: &[f32]| {

@@ -78,7 +78,6 @@ mod tests {
             extent: 1.0,
             material: 0,
             entering,
-            t: 1.0,
         }
     }
 

@@ -22,8 +22,6 @@ pub struct SurfacePoint {
     pub material: usize,
     /// Whether the ray met the side that the winding calls outer.
     pub entering: bool,
-    /// Ray parameter.
-    pub t: f64,
 }
 
 impl SurfacePoint {
@@ -45,7 +43,6 @@ impl SurfacePoint {
             extent: block.extent[lane],
             material: block.material[lane] as usize,
             entering: block.entering[lane],
-            t: block.t[lane],
         }
     }
 

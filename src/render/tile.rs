@@ -29,13 +29,11 @@ pub fn tiles(crop: Crop) -> Vec<Crop> {
 }
 
 /// Pixels of a tile along a Z-curve, so that any 4 or 16 in a row form a square.
-#[must_use]
-pub fn pixels(tile: Crop) -> Vec<(u32, u32)> {
+pub fn pixels(tile: Crop, out: &mut Vec<(u32, u32)>) {
     let even_bits = |i: u32| (0..5).fold(0, |a, b| a | ((i >> (2 * b)) & 1) << b);
-    (0..TILE * TILE)
-        .map(|i| (tile.x0 + even_bits(i), tile.y0 + even_bits(i >> 1)))
-        .filter(|&(x, y)| x < tile.x1 && y < tile.y1)
-        .collect()
+    let all = (0..TILE * TILE).map(|i| (tile.x0 + even_bits(i), tile.y0 + even_bits(i >> 1)));
+    out.clear();
+    out.extend(all.filter(|&(x, y)| x < tile.x1 && y < tile.y1));
 }
 
 /// Samples of a few neighbouring pixels that travel as one wave. Sample `j` of pixel `i` is
@@ -63,14 +61,12 @@ pub fn segments(pixels: &[(u32, u32)], spp: u32) -> impl Iterator<Item = Segment
 impl Segment<'_> {
     /// Fills `batch` with the camera rays.
     pub fn camera_rays(&self, camera: &Camera, job: &Job, batch: &mut PacketBatch<RayHitPacket>) {
-        let rays = self.pixels.len() * self.samples as usize;
-        batch.resize(rays);
+        batch.resize(self.pixels.len() * self.samples as usize);
+        let samples = self.first..self.first + self.samples;
+        let mut points = self.pixels.iter().flat_map(|&pixel| samples.clone().map(move |sample| (pixel, sample)));
         let (mut at, mut lens) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
-        for (k, (packet, live)) in batch.packets_mut().enumerate() {
-            for lane in 0..live {
-                let ray = k * LANES + lane;
-                let pixel = self.pixels[ray / self.samples as usize];
-                let sample = self.first + (ray % self.samples as usize) as u32;
+        for (packet, live) in batch.packets_mut() {
+            for (lane, (pixel, sample)) in points.by_ref().take(live).enumerate() {
                 let (x, y, disc) = image_point(camera, job, pixel, sample);
                 (at[0][lane], at[1][lane]) = (x, y);
                 (lens[0][lane], lens[1][lane]) = (disc.x, disc.y);
@@ -101,11 +97,17 @@ mod tests {
 
     const CROP: Crop = Crop { x0: 5, y0: 3, x1: 80, y1: 50 };
 
+    fn pixels_of(tile: Crop) -> Vec<(u32, u32)> {
+        let mut all = Vec::new();
+        pixels(tile, &mut all);
+        all
+    }
+
     #[test]
     fn tiles_cover_the_crop_once() {
         let mut seen = HashSet::new();
         for tile in tiles(CROP) {
-            for p in pixels(tile) {
+            for p in pixels_of(tile) {
                 assert!(seen.insert(p), "{p:?} twice");
             }
         }
@@ -115,7 +117,7 @@ mod tests {
 
     #[test]
     fn sixteen_pixels_in_a_row_are_a_square() {
-        let all = pixels(Crop { x0: 64, y0: 32, x1: 96, y1: 64 });
+        let all = pixels_of(Crop { x0: 64, y0: 32, x1: 96, y1: 64 });
         assert_eq!(all.len(), 1024);
         for block in all.chunks(16) {
             let spread = |f: fn(&(u32, u32)) -> u32| {
@@ -127,7 +129,7 @@ mod tests {
 
     #[test]
     fn segments_hold_every_sample_once_and_in_order() {
-        let all = pixels(tiles(CROP)[0]);
+        let all = pixels_of(tiles(CROP)[0]);
         for spp in [1, 2, 5, 16, 17, 70] {
             let mut next = vec![0; all.len()];
             let mut at = std::collections::HashMap::new();

@@ -223,11 +223,17 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
                 if !self.branching[block.material[lane] as usize] {
                     continue;
                 }
-                let point = SurfacePoint::of_lane(block, lane);
                 let weight = Block::vec3(&block.weight, lane);
                 let path = Path { slot: block.slot[lane], depth: block.depth[lane], weight };
+                let material = &self.scene.materials[block.material[lane] as usize];
+                if path.depth >= self.job.k_max {
+                    let most = weight.max_element() * material.passed_on();
+                    self.gathered.cut[path.slot as usize] += f64::from(most) * f64::from(self.radiance.beyond());
+                    continue;
+                }
+                let point = SurfacePoint::of_lane(block, lane);
                 let d = -point.to_eye.as_dvec3().normalize();
-                let (reflected, refracted) = shade::branches(&self.scene.materials[point.material], &point, d);
+                let (reflected, refracted) = shade::branches(material, &point, d);
                 if let Some(b) = reflected.and_then(|b| self.worth_sending(&path, &b)) {
                     self.tally.rays.reflected += 1;
                     self.send(b, &path, &point);
@@ -245,13 +251,11 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     fn worth_sending(&mut self, path: &Path, branch: &Branch) -> Option<Branch> {
         let weight = path.weight * branch.weight;
         let most = weight.max_element();
-        let too_deep = path.depth >= self.job.k_max;
-        if !too_deep && most >= self.job.min_weight && most > 0.0 {
+        if most >= self.job.min_weight && most > 0.0 {
             return Some(Branch { weight, ..*branch });
         }
-        self.tally.below_cut += u64::from(!too_deep);
-        let brings =
-            if too_deep { self.radiance.beyond() } else { self.radiance.within(self.job.k_max - path.depth - 1) };
+        self.tally.below_cut += 1;
+        let brings = self.radiance.within(self.job.k_max - path.depth - 1);
         self.gathered.cut[path.slot as usize] += f64::from(most) * f64::from(brings);
         None
     }

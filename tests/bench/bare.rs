@@ -144,7 +144,8 @@ impl Recording {
     fn rays(&self) -> usize {
         match self {
             Self::Nearest(b) => b.len(),
-            Self::Any(b) => b.len(),
+            // A lane that ends at minus infinity asks nothing.
+            Self::Any(b) => b.packets().iter().flat_map(|p| p.t_far).filter(|&t| t > 0.0).count(),
         }
     }
 }

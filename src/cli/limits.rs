@@ -1,0 +1,62 @@
+//! What is refused before anything is read or allocated.
+
+use super::exit::{Exit, Failure};
+use super::plan::Plan;
+use super::style::bytes;
+use super::system;
+use tison::film::Film;
+
+/// Longest side of what is rendered at once: what the header of a JPEG can state.
+pub const MAX_SIDE: u64 = 65_535;
+
+/// Refuses images that are too large for tison or for this machine's free memory.
+pub fn check(plan: &Plan) -> Result<(), Failure> {
+    if plan.pixel.is_some() {
+        return Ok(());
+    }
+    let crop = plan.job.crop;
+    let (width, height) = (u64::from(crop.x1 - crop.x0), u64::from(crop.y1 - crop.y0));
+    refuse(width, height, memory_needed(width, height, plan), system::available_memory())
+}
+
+/// The film, and as much again for the encoder's copy of it.
+fn memory_needed(width: u64, height: u64, plan: &Plan) -> u64 {
+    Film::bytes(width, height, &plan.job.aovs).saturating_mul(2)
+}
+
+fn refuse(width: u64, height: u64, needed: u64, available: Option<u64>) -> Result<(), Failure> {
+    let why = if width > MAX_SIDE || height > MAX_SIDE {
+        format!("no side may be longer than {MAX_SIDE} pixels")
+    } else {
+        match available {
+            Some(free) if needed > free => format!("{} are free", bytes(free)),
+            _ => return Ok(()),
+        }
+    };
+    let what = format!("an image of {width}x{height} pixels needs about {} of memory; {why}", bytes(needed));
+    Err(Failure::new(Exit::Limit, what).help("choose a smaller --size or --scale, or render parts of it with --crop"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_limits_from_both_sides() {
+        const GB: u64 = 1_000_000_000;
+        let cases = [
+            ("ordinary", 1280, 720, GB, Some(2 * GB), true),
+            ("exactly what is free", 1280, 720, GB, Some(GB), true),
+            ("one byte more", 1280, 720, GB, Some(GB - 1), false),
+            ("nobody knows what is free", 1280, 720, GB, None, true),
+            ("longest side", MAX_SIDE, 1, GB, None, true),
+            ("longer", MAX_SIDE + 1, 1, 1, None, false),
+            ("higher", 1, MAX_SIDE + 1, 1, None, false),
+        ];
+        for (name, w, h, needed, free, ok) in cases {
+            let result = refuse(w, h, needed, free);
+            assert_eq!(result.is_ok(), ok, "{name}");
+            assert!(result.err().is_none_or(|f| f.exit == Exit::Limit), "{name}");
+        }
+    }
+}

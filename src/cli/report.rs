@@ -1,0 +1,188 @@
+//! What a run tells when it is over: one screen on stderr, and figures for programs.
+
+use super::exit::Failure;
+use super::message::Messages;
+use super::plan::{Plan, Target};
+use super::render::Done;
+use super::style::{bytes, counted, grouped, seconds};
+use super::{output, stats, system};
+use tison::backend::AnyBackend;
+use tison::film;
+use tison::scene::{CameraDesc, Projection, Scene, SceneCounts};
+
+/// The story of a run.
+#[derive(Debug)]
+pub struct Report<'a> {
+    pub plan: &'a Plan,
+    pub counts: SceneCounts,
+    /// Name of what a scene may need, and whether this one does.
+    pub needs: Vec<(&'static str, bool)>,
+    pub scene_bytes: u64,
+    pub backend_bytes: u64,
+    /// Release, packet width, build quality.
+    pub details: String,
+    /// Of the first frame.
+    pub camera: CameraDesc,
+    pub done: Done,
+    pub peak_memory: Option<u64>,
+}
+
+impl<'a> Report<'a> {
+    /// Of a run that is over.
+    pub fn new(plan: &'a Plan, scene: &Scene, backend: &AnyBackend, camera: &CameraDesc, done: Done) -> Self {
+        Self {
+            plan,
+            counts: scene.counts(),
+            needs: scene.needs().list().to_vec(),
+            scene_bytes: scene.bytes() as u64,
+            backend_bytes: backend.bytes(),
+            details: backend.details(),
+            camera: *camera,
+            done,
+            peak_memory: system::peak_memory(),
+        }
+    }
+
+    /// Writes the summary and the figures to where the plan wants them.
+    pub fn tell(&self, messages: &Messages) -> Result<(), Failure> {
+        if !self.plan.quiet {
+            self.lines().iter().for_each(|line| messages.line(line));
+            if self.done.finished < self.pixels() {
+                messages.warning(&format!(
+                    "stopped: {:.1} % of the pixels are rendered, the others are black",
+                    100.0 * self.done.finished as f64 / self.pixels() as f64
+                ));
+            }
+        }
+        let Some(target) = &self.plan.stats else { return Ok(()) };
+        let text = format!("{:#}\n", stats::json(self));
+        match target {
+            Target::Stdout => output::print(text.as_bytes()).map(drop),
+            Target::File(path) => Ok(film::save(path, |out| out.write_all(text.as_bytes())).map(drop)?),
+        }
+    }
+
+    /// Pixels of all frames.
+    pub fn pixels(&self) -> u64 {
+        let (width, height) = self.image_size();
+        u64::from(width) * u64::from(height) * u64::from(self.plan.turntable.unwrap_or(1))
+    }
+
+    /// Pixels of one image across and down.
+    pub fn image_size(&self) -> (u32, u32) {
+        let crop = self.plan.job.crop;
+        (crop.x1 - crop.x0, crop.y1 - crop.y0)
+    }
+
+    pub fn mrays_per_s(&self) -> f64 {
+        if self.done.seconds.render > 0.0 {
+            self.done.stats.rays.total() as f64 / self.done.seconds.render / 1e6
+        } else {
+            0.0
+        }
+    }
+
+    /// Memory of the scene and the hierarchy is told with -v only.
+    fn lines(&self) -> Vec<String> {
+        let mut lines = vec![self.input_line(), self.backend_line(), self.image_line(), self.rays_line()];
+        lines.push(self.time_line());
+        if self.plan.verbose {
+            lines.push(self.camera_line());
+            lines.push(format!("memory    scene {}, hierarchy {}", bytes(self.scene_bytes), bytes(self.backend_bytes)));
+        }
+        lines.extend(self.skipped_line());
+        lines.push(self.error_line());
+        lines.extend(
+            self.done.written.iter().map(|(path, size)| format!("wrote     {} ({})", path.display(), bytes(*size))),
+        );
+        lines
+    }
+
+    fn input_line(&self) -> String {
+        let c = &self.counts;
+        let mut line = format!(
+            "input     {}: {}, {}, {}, {}",
+            self.plan.input.display(),
+            counted(c.triangles as u64, "triangle"),
+            counted(c.vertices as u64, "vertex"),
+            counted(c.materials as u64, "material"),
+            counted(c.lights as u64, "light"),
+        );
+        if c.degenerate > 0 {
+            line += &format!("; {} without area", grouped(c.degenerate as u64));
+        }
+        if c.non_finite > 0 {
+            line += &format!("; {} out of range", grouped(c.non_finite as u64));
+        }
+        line
+    }
+
+    fn backend_line(&self) -> String {
+        let threads = counted(self.plan.threads as u64, "thread");
+        format!("backend   {}: {}; {threads}", self.plan.backend.name(), self.details)
+    }
+
+    fn image_line(&self) -> String {
+        let (width, height) = self.image_size();
+        let frames = self.plan.turntable.map_or(String::new(), |n| format!(", {}", counted(u64::from(n), "frame")));
+        let (spp, seed) = (self.plan.job.spp, self.plan.job.seed);
+        let samples = counted(u64::from(spp), "sample");
+        let hint = if spp.is_power_of_two() { "" } else { " (a power of two is spread better)" };
+        format!("image     {width}x{height}, {samples} a pixel{hint}, seed {seed}{frames}")
+    }
+
+    fn rays_line(&self) -> String {
+        let rays = &self.done.stats.rays;
+        let kinds = [
+            ("camera", rays.camera),
+            ("shadow", rays.shadow),
+            ("reflected", rays.reflected),
+            ("refracted", rays.refracted),
+        ];
+        let kinds = kinds.map(|(name, n)| format!("{} {name}", grouped(n)));
+        format!("rays      {}; {:.1} Mrays/s", kinds.join(", "), self.mrays_per_s())
+    }
+
+    fn time_line(&self) -> String {
+        let s = &self.done.seconds;
+        let stages =
+            [("read", s.read), ("build", s.build), ("render", s.render), ("write", s.write), ("total", s.total)];
+        let stages = stages.map(|(name, t)| format!("{name} {}", seconds(t)));
+        let peak = self.peak_memory.map_or(String::new(), |p| format!("; peak memory {}", bytes(p)));
+        format!("time      {}{peak}", stages.join(", "))
+    }
+
+    fn camera_line(&self) -> String {
+        let CameraDesc { eye, target, up, projection, aperture, .. } = self.camera;
+        let projection = match projection {
+            Projection::Perspective { fov_deg } => format!("--fov {fov_deg}"),
+            Projection::Orthographic { height } => format!("--ortho {height}"),
+        };
+        let v = |v: glam::DVec3| format!("{},{},{}", v.x, v.y, v.z);
+        format!("camera    --eye {} --target {} --up {} {projection} --aperture {aperture}", v(eye), v(target), v(up))
+    }
+
+    fn skipped_line(&self) -> Option<String> {
+        let parts: Vec<String> = stats::skipped(self)
+            .into_iter()
+            .map(|(name, why)| {
+                let name = name.replace('_', " ");
+                match why {
+                    stats::Skipped::Count(n) => format!("{} {name}", grouped(n)),
+                    stats::Skipped::Because(why) => format!("{name} ({why})"),
+                }
+            })
+            .collect();
+        (!parts.is_empty()).then(|| format!("skipped   {}", parts.join(", ")))
+    }
+
+    fn error_line(&self) -> String {
+        let s = &self.done.stats;
+        let cut = if s.cut_off_max == 0.0 {
+            "nothing cut off".into()
+        } else {
+            format!("cut-off adds at most {:.2e} to a pixel, {:.2e} on average", s.cut_off_max, s.cut_off_mean)
+        };
+        format!("error     {cut}; {}", counted(s.non_finite_samples, "non-finite sample"))
+    }
+}

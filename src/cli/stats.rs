@@ -1,0 +1,97 @@
+//! The figures of a run as JSON. Others read these keys: add, never rename.
+
+use super::EMBREE;
+use super::report::Report;
+use serde_json::{Map, Value, json};
+use tison::scene::SceneCounts;
+
+/// Why something was not done.
+#[derive(Debug, PartialEq)]
+pub enum Skipped {
+    /// That often.
+    Count(u64),
+    /// At all.
+    Because(&'static str),
+}
+
+/// What was left out, by name.
+pub fn skipped(report: &Report<'_>) -> Vec<(&'static str, Skipped)> {
+    let unneeded = report.needs.iter().filter(|(_, needed)| !needed).map(|&(name, _)| {
+        let why = match name {
+            "reflection" => "no material mirrors",
+            "refraction" => "no material refracts",
+            "specular" => "no material has a highlight",
+            "smooth_normals" => "the mesh has no normals",
+            "shadow_rays" => "no light changes any material",
+            _ => "not needed",
+        };
+        (name, Skipped::Because(why))
+    });
+    let counts = [
+        ("shadow_rays_facing_away", report.done.stats.shadow_rays_facing_away),
+        ("branches_below_cut", report.done.stats.branches_below_cut),
+    ];
+    let counts = counts.into_iter().filter(|&(_, n)| n > 0).map(|(name, n)| (name, Skipped::Count(n)));
+    unneeded.chain(counts).collect()
+}
+
+/// Counts under the names that `info --json` uses too.
+pub fn scene_json(c: &SceneCounts) -> Value {
+    json!({
+        "triangles": c.triangles,
+        "degenerate": c.degenerate,
+        "non_finite": c.non_finite,
+        "vertices": c.vertices,
+        "objects": c.objects,
+        "spheres": c.spheres,
+        "cubes": c.cubes,
+        "cylinders": c.cylinders,
+        "lights": c.lights,
+        "materials": c.materials,
+    })
+}
+
+/// All figures of a run.
+pub fn json(report: &Report<'_>) -> Value {
+    let (width, height) = report.image_size();
+    let (rays, s, stats) = (&report.done.stats.rays, &report.done.seconds, &report.done.stats);
+    let share = report.done.finished as f64 / report.pixels() as f64;
+    let skipped: Map<String, Value> = skipped(report)
+        .into_iter()
+        .map(|(name, why)| {
+            let value = match why {
+                Skipped::Count(n) => n.into(),
+                Skipped::Because(why) => why.into(),
+            };
+            (name.to_owned(), value)
+        })
+        .collect();
+    json!({
+        "tison": env!("CARGO_PKG_VERSION"),
+        "backend": report.plan.backend.name(),
+        "embree": EMBREE,
+        "threads": report.plan.threads,
+        "image": {
+            "width": width, "height": height, "spp_mean": f64::from(report.plan.job.spp) * share,
+            "frames": report.plan.turntable.unwrap_or(1), "finished": share,
+        },
+        "scene": scene_json(&report.counts),
+        "seconds": {
+            "read": s.read, "textures": 0.0, "build": s.build, "render": s.render, "write": s.write, "total": s.total,
+        },
+        "rays": {
+            "camera": rays.camera, "shadow": rays.shadow, "reflected": rays.reflected, "refracted": rays.refracted,
+        },
+        "mrays_per_s": report.mrays_per_s(),
+        "peak_rss_bytes": report.peak_memory,
+        "memory": { "scene_bytes": report.scene_bytes, "backend_bytes": report.backend_bytes },
+        "skipped": skipped,
+        "error": {
+            "cut_off_max": stats.cut_off_max,
+            "cut_off_mean": stats.cut_off_mean,
+            "sampling_rmse_estimate": Value::Null,
+            "non_finite_samples": stats.non_finite_samples,
+        },
+        "warnings": report.done.warnings,
+    })
+}

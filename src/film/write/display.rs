@@ -1,0 +1,145 @@
+//! Auxiliary images made visible, for formats that hold colours only.
+//!
+//! | image | 8-bit | Radiance HDR |
+//! |---|---|---|
+//! | depth | nearest white to farthest dark grey, black where nothing was hit | distance, 0 where nothing was hit |
+//! | normal | `0.5 + 0.5 n`; mid-grey where nothing was hit | the same |
+//! | albedo | sRGB | linear |
+//! | id | a colour for each pair of object and primitive, black where nothing was hit | the same |
+//! | hits | 0 black, 1 white | share |
+//! | cost | 0 black, dearest pixel white | rays |
+//!
+//! Only albedo is bent by the sRGB curve; elsewhere equal steps of the value are equal steps of the byte.
+
+use super::srgb_bytes;
+use crate::film::{Aov, AovImage};
+
+/// The grey of the farthest hit: darker than any nearer one, and not the black of a miss.
+const FARTHEST: f32 = 32.0;
+
+/// As 8-bit RGB.
+pub fn bytes(aov: &AovImage) -> Vec<[u8; 3]> {
+    let values = &aov.data;
+    match aov.kind {
+        Aov::Depth => depth(values),
+        Aov::Normal => triples(values).iter().map(|n| n.map(|c| step(0.5 + 0.5 * c))).collect(),
+        Aov::Albedo => srgb_bytes(triples(values)),
+        Aov::Id => pairs(values).iter().map(|&pair| id_colour(pair)).collect(),
+        Aov::Hits => values.iter().map(|&h| [step(h); 3]).collect(),
+        Aov::Cost => {
+            let most = values.iter().copied().fold(0.0, f32::max).max(f32::MIN_POSITIVE);
+            values.iter().map(|&c| [step(c / most); 3]).collect()
+        }
+    }
+}
+
+/// As non-negative finite RGB.
+pub fn linear(aov: &AovImage) -> Vec<[f32; 3]> {
+    let values = &aov.data;
+    match aov.kind {
+        Aov::Depth => values.iter().map(|&d| [if d.is_finite() { d } else { 0.0 }; 3]).collect(),
+        Aov::Normal => triples(values).iter().map(|n| n.map(|c| 0.5 + 0.5 * c)).collect(),
+        Aov::Albedo => triples(values).to_vec(),
+        Aov::Id => pairs(values).iter().map(|&pair| id_colour(pair).map(|b| f32::from(b) / 255.0)).collect(),
+        Aov::Hits | Aov::Cost => values.iter().map(|&v| [v; 3]).collect(),
+    }
+}
+
+fn triples(values: &[f32]) -> &[[f32; 3]] {
+    values.as_chunks().0
+}
+
+fn pairs(values: &[f32]) -> &[[f32; 2]] {
+    values.as_chunks().0
+}
+
+fn depth(values: &[f32]) -> Vec<[u8; 3]> {
+    let hits = values.iter().copied().filter(|d| d.is_finite());
+    let (near, far) = hits.fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), d| (lo.min(d), hi.max(d)));
+    // In f64, where neither the difference of two floats overflows nor a tiny one vanishes.
+    let range = f64::from(far) - f64::from(near);
+    let grey = |d: f32| {
+        if !d.is_finite() {
+            return 0;
+        }
+        let share = if range > 0.0 { (f64::from(d) - f64::from(near)) / range } else { 0.0 };
+        (255.0 - f64::from(255.0 - FARTHEST) * share).round_ties_even() as u8
+    };
+    values.iter().map(|&d| [grey(d); 3]).collect()
+}
+
+/// 0..=1 to 0..=255; `as` saturates and takes NaN to 0.
+fn step(share: f32) -> u8 {
+    (255.0 * share).round_ties_even() as u8
+}
+
+/// A colour that tells neighbours apart: the three bytes of a hash, none darker than 64.
+fn id_colour([object, prim]: [f32; 2]) -> [u8; 3] {
+    if object == 0.0 && prim == 0.0 {
+        return [0; 3];
+    }
+    let hash = mix(mix(object as u32) ^ prim as u32);
+    [0, 8, 16].map(|shift| 64 + ((hash >> shift & 0xff) * 191 / 255) as u8)
+}
+
+/// The 32-bit finaliser of MurmurHash3: every bit in changes every bit out half of the time.
+fn mix(mut x: u32) -> u32 {
+    x = (x ^ (x >> 16)).wrapping_mul(0x85eb_ca6b);
+    x = (x ^ (x >> 13)).wrapping_mul(0xc2b2_ae35);
+    x ^ (x >> 16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(kind: Aov, data: &[f32]) -> AovImage {
+        AovImage { kind, data: data.to_vec() }
+    }
+
+    #[test]
+    fn depth_runs_from_white_to_dark_grey_and_a_miss_is_black() {
+        let shown = bytes(&image(Aov::Depth, &[2.0, 3.0, 4.0, f32::INFINITY]));
+        assert_eq!(shown, [[255; 3], [144; 3], [32; 3], [0; 3]]);
+        assert_eq!(bytes(&image(Aov::Depth, &[7.0, 7.0])), [[255; 3]; 2], "one depth everywhere");
+        assert_eq!(bytes(&image(Aov::Depth, &[f32::INFINITY; 2])), [[0; 3]; 2], "nothing hit");
+        let extreme = bytes(&image(Aov::Depth, &[f32::MIN_POSITIVE, f32::MAX]));
+        assert_eq!(extreme, [[255; 3], [32; 3]]);
+    }
+
+    #[test]
+    fn the_other_kinds() {
+        assert_eq!(bytes(&image(Aov::Normal, &[-1.0, 0.0, 1.0])), [[0, 128, 255]]);
+        assert_eq!(bytes(&image(Aov::Hits, &[0.0, 0.5, 1.0])), [[0; 3], [128; 3], [255; 3]]);
+        assert_eq!(bytes(&image(Aov::Cost, &[0.0, 2.0, 4.0])), [[0; 3], [128; 3], [255; 3]]);
+        assert_eq!(bytes(&image(Aov::Cost, &[0.0, 0.0])), [[0; 3]; 2]);
+        assert_eq!(bytes(&image(Aov::Albedo, &[0.0, 0.214_041_14, 1.0])), [[0, 128, 255]]);
+    }
+
+    #[test]
+    fn ids_that_differ_have_colours_that_differ() {
+        assert_eq!(bytes(&image(Aov::Id, &[0.0, 0.0])), [[0; 3]]);
+        let pairs: Vec<f32> = (0..64).flat_map(|i| [1.0 + (i / 8) as f32, 1.0 + (i % 8) as f32]).collect();
+        let mut colours = bytes(&image(Aov::Id, &pairs));
+        assert!(colours.iter().flatten().all(|&b| b >= 64));
+        colours.sort_unstable();
+        colours.dedup();
+        assert_eq!(colours.len(), 64);
+    }
+
+    #[test]
+    fn what_goes_to_hdr_is_finite_and_not_negative() {
+        for kind in Aov::ALL {
+            let data = match kind.channels() {
+                1 => vec![0.0, f32::INFINITY],
+                2 => vec![3.0, 70_000.0],
+                _ => vec![-1.0, 0.0, 1.0],
+            };
+            let kind_has_infinity = kind == Aov::Depth;
+            let data = if kind_has_infinity { data } else { data.into_iter().filter(|v| v.is_finite()).collect() };
+            for value in linear(&AovImage { kind, data }).as_flattened() {
+                assert!(value.is_finite() && (*value >= 0.0 || kind == Aov::Albedo), "{}", kind.name());
+            }
+        }
+    }
+}
