@@ -11,7 +11,9 @@
 //! What a ray meets is decided by [`triangle::intersect`](crate::geom::triangle::intersect)
 //! alone. Boxes and the f32 filter before it only skip triangles that it would turn away,
 //! with their own rounding accounted for, so that the answer is that of a loop over all
-//! triangles: the least `t`, and among equal ones the lowest `(geom_id, prim_id)`.
+//! triangles: the least `t`, and among equal ones the lowest `(geom_id, prim_id)`. Only a
+//! triangle that holds the ray in its plane to within f64's rounding may be passed over:
+//! whether it is hit, and where, is rounding as well.
 
 mod bins;
 mod build;
