@@ -72,6 +72,17 @@ impl Box4 {
         e.x * e.y + e.y * e.z + e.z * e.x
     }
 
+    pub(super) fn longest_axis(&self) -> usize {
+        let e = self.size();
+        if e.x >= e.y && e.x >= e.z {
+            0
+        } else if e.y >= e.z {
+            1
+        } else {
+            2
+        }
+    }
+
     /// What to multiply lengths with so that areas neither overflow nor vanish.
     pub(super) fn unit(&self) -> f32 {
         let e = self.size();
@@ -132,6 +143,13 @@ pub(super) struct Plane {
 }
 
 impl Plane {
+    /// The plane that halves the longest edge of the box around the centroids; `None`
+    /// where they coincide.
+    pub(super) fn through_middle(centroids: Box4) -> Option<Self> {
+        let (binning, axis) = (Binning::new(centroids, 2), centroids.longest_axis());
+        binning.usable[axis].then_some(Self { binning, axis, bin: 1 })
+    }
+
     #[inline]
     pub(super) fn is_left(&self, centroid: Vec4) -> bool {
         self.binning.of(centroid)[self.axis] < self.bin
@@ -154,10 +172,9 @@ impl Bins {
         for item in items {
             let (lo, hi) = (item.lo(), item.hi);
             let bin = binning.of(lo + hi);
-            for axis in 0..3 {
-                let b = bin[axis] as usize;
-                bins.boxes[axis][b].grow(lo, hi);
-                bins.counts[axis][b] += 1;
+            for (axis, &b) in bin[..3].iter().enumerate() {
+                bins.boxes[axis][b as usize].grow(lo, hi);
+                bins.counts[axis][b as usize] += 1;
             }
         }
         bins

@@ -173,29 +173,28 @@ impl Builder<'_> {
 
     /// Two groups, neither empty.
     fn split<'a>(&self, group: Group<'a>, depth: usize) -> (Group<'a>, Group<'a>) {
-        if depth < HEURISTIC_DEPTH
-            && let Some(plane) = self.best_plane(&group)
-        {
-            return group.partition(&plane);
+        let plane = match self.quality {
+            _ if depth >= HEURISTIC_DEPTH => None,
+            Quality::Good => cheapest_plane(&group),
+            Quality::Fast => Plane::through_middle(group.centroids),
+        };
+        match plane {
+            Some(plane) => group.partition(&plane),
+            None => group.halve(),
         }
-        group.halve()
     }
+}
 
-    /// Where the surface-area heuristic splits; `None` where all centroids coincide.
-    fn best_plane(&self, group: &Group<'_>) -> Option<Plane> {
-        let bins = match self.quality {
-            Quality::Good => (4 + group.items.len() / 8).min(BINS),
-            Quality::Fast => 8,
-        };
-        let binning = Binning::new(group.centroids, bins);
-        let filled = if group.items.len() > WIDE {
-            let parts = group.items.par_chunks(TASK).with_min_len(4).map(|chunk| Bins::of(chunk, &binning));
-            parts.reduce(|| Bins::EMPTY, Bins::plus)
-        } else {
-            Bins::of(group.items, &binning)
-        };
-        filled.best(&binning, group.bounds.unit())
-    }
+/// Where the surface-area heuristic splits; `None` where all centroids coincide.
+fn cheapest_plane(group: &Group<'_>) -> Option<Plane> {
+    let binning = Binning::new(group.centroids, (4 + group.items.len() / 8).min(BINS));
+    let bins = if group.items.len() > WIDE {
+        let parts = group.items.par_chunks(TASK).map(|chunk| Bins::of(chunk, &binning));
+        parts.reduce(|| Bins::EMPTY, Bins::plus)
+    } else {
+        Bins::of(group.items, &binning)
+    };
+    bins.best(&binning, group.bounds.unit())
 }
 
 impl Subtree {
@@ -284,14 +283,7 @@ impl<'a> Group<'a> {
 
     /// Two halves by the order of centroids along the longest axis.
     fn halve(self) -> (Self, Self) {
-        let e = self.centroids.size();
-        let axis = if e.x >= e.y && e.x >= e.z {
-            0
-        } else if e.y >= e.z {
-            1
-        } else {
-            2
-        };
+        let axis = self.centroids.longest_axis();
         let mid = self.items.len() / 2;
         let key = |item: &Item| (item.centroid()[axis], item.id());
         self.items.select_nth_unstable_by(mid, |a, b| {
@@ -303,5 +295,97 @@ impl<'a> Group<'a> {
         left.start = self.start;
         right.start = self.start + mid;
         (left, right)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::native::bvh::MAX_DEPTH;
+    use crate::backend::native::traverse::SMALL_STACK;
+    use glam::Vec3;
+    use rayon::ThreadPoolBuilder;
+
+    static NEVER: AtomicBool = AtomicBool::new(false);
+
+    fn built(mesh: &Arc<TriangleMesh>, quality: Quality) -> Bvh {
+        let options = BuildOptions { quality, cancel: &NEVER };
+        build(&[Arc::clone(mesh)], &[0], &options).expect("never cancelled")
+    }
+
+    fn soup(triangles: impl Iterator<Item = [Vec3; 3]>) -> Arc<TriangleMesh> {
+        let points: Vec<f32> = triangles.flatten().flat_map(|p| p.to_array()).collect();
+        let faces = (0..points.len() as u32 / 9).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        Arc::new(TriangleMesh::new(points, faces))
+    }
+
+    /// Small triangles along a spiral.
+    fn spiral(n: u32) -> Arc<TriangleMesh> {
+        soup((0..n).map(|i| {
+            let a = i as f32 * 0.37;
+            let p = Vec3::new(a.cos(), a.sin(), 1e-4 * i as f32) * (1.0 + (1.7 * a).sin());
+            [p, p + Vec3::new(0.01, 0.02, 0.0), p + Vec3::new(0.0, 0.01, 0.03)]
+        }))
+    }
+
+    /// Each triangle is 1.5 times the size of the one before: planes at equal distances
+    /// peel off a few at a time.
+    fn growing(n: i32) -> Arc<TriangleMesh> {
+        soup((0..n).map(|i| {
+            let s = 1.5f32.powi(i % 200 - 100) * (1.0 + 0.001 * (i / 200) as f32);
+            [Vec3::splat(s), Vec3::new(2.0 * s, s, s), Vec3::new(s, 2.0 * s, s)]
+        }))
+    }
+
+    /// Counts each triangle, and checks that the boxes above hold it with room to spare.
+    fn visit(bvh: &Bvh, child: Child, (lo, hi): (Vec3, Vec3), depth: usize, seen: &mut [u32]) -> usize {
+        if child.is_leaf() {
+            let block = &bvh.blocks[child.block_index()];
+            for lane in (0..WIDTH).filter(|lane| child.lanes() >> lane & 1 == 1) {
+                seen[block.id[lane] as usize] += 1;
+                for p in block.triangle(lane) {
+                    assert!(p.cmpgt(lo).all() && p.cmplt(hi).all());
+                }
+            }
+            return depth;
+        }
+        let node = &bvh.nodes[child.node_index()];
+        let lanes = (0..WIDTH).filter(|&lane| node.child[lane] != Child::NONE);
+        let below = lanes.map(|lane| {
+            let side = |side: usize| Vec3::from([0, 1, 2].map(|axis| node.bounds[axis][side][lane]));
+            let inner = (side(0).max(lo), side(1).min(hi));
+            visit(bvh, node.child[lane], inner, depth + 1, seen)
+        });
+        below.max().expect("a node has children")
+    }
+
+    #[test]
+    fn every_triangle_is_in_one_leaf_inside_all_boxes_above() {
+        let meshes = [spiral(1), spiral(4), spiral(5), spiral(77), spiral(30_000), growing(9000)];
+        for (mesh, quality) in meshes.iter().flat_map(|m| [(m, Quality::Good), (m, Quality::Fast)]) {
+            let bvh = built(mesh, quality);
+            let mut seen = vec![0; mesh.face_count()];
+            let all = (Vec3::NEG_INFINITY, Vec3::INFINITY);
+            assert_eq!(visit(&bvh, Child::ROOT, all, 0, &mut seen), bvh.depth);
+            assert!(seen.iter().all(|&n| n == 1));
+        }
+    }
+
+    #[test]
+    fn the_tree_is_the_same_for_any_number_of_threads() {
+        let mesh = spiral(3 * WIDE as u32 / 2);
+        for quality in [Quality::Good, Quality::Fast] {
+            let [one, two, seven] = [1, 2, 7].map(|threads| {
+                let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+                pool.install(|| built(&mesh, quality))
+            });
+            assert!(one == two && one == seven, "{quality:?}");
+        }
+    }
+
+    #[test]
+    fn a_tree_deeper_than_the_small_stack_stays_below_the_limit() {
+        let bvh = built(&growing(9000), Quality::Fast);
+        assert!(bvh.stack_len() > SMALL_STACK && bvh.depth <= MAX_DEPTH, "{}", bvh.depth);
     }
 }

@@ -1,7 +1,7 @@
 //! The hierarchy in memory: nodes of four boxes, leaves of up to four triangles.
 
 use super::bins::Box4;
-use glam::Vec4;
+use glam::{Vec3, Vec4};
 
 /// Children of a node, and triangles of a leaf: the lanes of one SSE register.
 pub(super) const WIDTH: usize = 4;
@@ -25,6 +25,8 @@ pub(super) struct Child(u32);
 
 impl Child {
     const LEAF: u32 = 1 << 31;
+    /// The first node.
+    pub(super) const ROOT: Self = Self(0);
     /// A child whose box no ray enters.
     pub(super) const NONE: Self = Self(u32::MAX);
 
@@ -74,7 +76,7 @@ impl Child {
 }
 
 /// Four boxes side by side and what is in them.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(super) struct Node {
     /// `bounds[axis][0]` is the low side of the four boxes, `bounds[axis][1]` the high one.
@@ -99,7 +101,7 @@ impl Node {
 
 /// Up to four triangles side by side. The corners are copied here: a test needs no
 /// index, and the lanes are what the f32 filter reads.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(32))]
 pub(super) struct Block {
     /// `corners[k][axis]`: coordinate `axis` of corner `k` of the four triangles.
@@ -112,7 +114,7 @@ impl Block {
     pub(super) const EMPTY: Self = Self { corners: [[Vec4::ZERO; 3]; 3], id: [u32::MAX; WIDTH] };
 
     /// Puts a triangle into `lane`.
-    pub(super) fn set(&mut self, lane: usize, corners: [glam::Vec3; 3], id: u32) {
+    pub(super) fn set(&mut self, lane: usize, corners: [Vec3; 3], id: u32) {
         for (to, from) in self.corners.iter_mut().zip(corners) {
             for axis in 0..3 {
                 to[axis][lane] = from[axis];
@@ -123,13 +125,20 @@ impl Block {
 
     /// Corners of the triangle in `lane`.
     #[inline]
-    pub(super) fn triangle(&self, lane: usize) -> [glam::Vec3; 3] {
-        self.corners.map(|c| glam::Vec3::new(c[0][lane], c[1][lane], c[2][lane]))
+    pub(super) fn triangle(&self, lane: usize) -> [Vec3; 3] {
+        self.permuted(lane, [0, 1, 2])
+    }
+
+    /// The same with coordinates in the order of `axes`.
+    #[inline]
+    pub(super) fn permuted(&self, lane: usize, axes: [usize; 3]) -> [Vec3; 3] {
+        let at = |corner: usize, axis: usize| self.corners[corner][axis][lane];
+        core::array::from_fn(|k| Vec3::from_array(axes.map(|axis| at(k, axis))))
     }
 }
 
 /// A whole hierarchy; node 0 is the root. No nodes: no triangles.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, PartialEq)]
 pub(super) struct Bvh {
     pub(super) nodes: Vec<Node>,
     pub(super) blocks: Vec<Block>,

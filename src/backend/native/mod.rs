@@ -6,28 +6,36 @@
 //! | `bvh` | the hierarchy in memory |
 //! | `ray` | a ray prepared for boxes and triangles |
 //! | `traverse` | the way of a ray through the hierarchy |
+//! | `packet` | the same for sixteen coherent rays |
 //!
 //! What a ray meets is decided by [`triangle::intersect`](crate::geom::triangle::intersect)
 //! alone. Boxes and the f32 filter before it only skip triangles that it would turn away,
 //! with their own rounding accounted for, so that the answer is that of a loop over all
-//! triangles: the least `t`, and among equal ones the lowest `(geom_id, prim_id)`.
+//! triangles: the least `t`, and among equal ones the lowest `(geom_id, prim_id)`. Only a
+//! triangle that holds the ray in its plane to within f64's rounding may be passed over:
+//! whether it is hit, and where, is rounding as well.
 
 mod bins;
 mod build;
 mod bvh;
+mod packet;
 mod ray;
 mod traverse;
 
 use super::Backend;
-use crate::geom::{Hit, Ray, TriangleMesh};
+use crate::geom::{Coherence, Hit, PacketBatch, Ray, RayHitPacket, RayPacket, TriangleMesh};
 use bvh::{Bvh, MAX_TRIANGLES};
+use core::fmt;
+use packet::Packets;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use traverse::Found;
 
 /// How much time the hierarchy is worth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Quality {
-    /// Built sooner, slower to trace: for fewer than about ten rays per triangle.
+    /// Boxes are split in the middle: about 0.6 times the time to build. Rays over an even
+    /// mesh are as fast, over triangles of very different size they are slower.
     Fast,
     /// The surface-area heuristic throughout.
     #[default]
@@ -59,7 +67,6 @@ pub enum BuildError {
 }
 
 /// A frozen scene of triangle meshes, traced without Embree.
-#[derive(Debug)]
 pub struct Native {
     bvh: Bvh,
     /// Number of the first face of each mesh: faces are counted through all meshes.
@@ -98,20 +105,59 @@ impl Native {
     }
 }
 
+impl fmt::Debug for Native {
+    /// Counts: the hierarchy itself would fill many screens.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (nodes, leaves) = (self.bvh.nodes.len(), self.bvh.blocks.len());
+        f.debug_struct("Native")
+            .field("meshes", &self.first.len())
+            .field("nodes", &nodes)
+            .field("leaves", &leaves)
+            .field("depth", &self.bvh.depth)
+            .finish()
+    }
+}
+
 /// `(geom_id, prim_id)` of the face with number `id`.
 fn owner(first: &[u32], id: u32) -> (u32, u32) {
     let geom = first.partition_point(|&f| f <= id) - 1;
     (geom as u32, id - first[geom])
 }
 
+impl Native {
+    fn hit(&self, found: &Found) -> Hit {
+        let (geom_id, prim_id) = owner(&self.first, found.id);
+        Hit { t: found.t, u: found.u, v: found.v, ng: found.ng, prim_id, geom_id }
+    }
+}
+
 impl Backend for Native {
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        let found = self.bvh.nearest(ray)?;
-        let (geom_id, prim_id) = owner(&self.first, found.id);
-        Some(Hit { t: found.t, u: found.u, v: found.v, ng: found.ng, prim_id, geom_id })
+        self.bvh.nearest(ray).map(|found| self.hit(&found))
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
         self.bvh.any(ray)
+    }
+
+    fn intersect_many(&self, rays: &mut PacketBatch<RayHitPacket>, coherence: Coherence) {
+        let mut packets = Packets::new(&self.bvh);
+        for (packet, live) in rays.packets_mut() {
+            packets.trace::<false>(&packet.ray, live, coherence);
+            for lane in 0..live {
+                let hit = packets.found(lane).map(|found| self.hit(&found));
+                packet.set_hit(lane, hit.as_ref());
+            }
+        }
+    }
+
+    fn occluded_many(&self, rays: &mut PacketBatch<RayPacket>, coherence: Coherence) {
+        let mut packets = Packets::new(&self.bvh);
+        for (packet, live) in rays.packets_mut() {
+            packets.trace::<true>(packet, live, coherence);
+            for lane in (0..live).filter(|&lane| packets.any(lane)) {
+                packet.t_far[lane] = f32::NEG_INFINITY;
+            }
+        }
     }
 }

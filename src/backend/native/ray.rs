@@ -3,49 +3,58 @@
 use super::bvh::{Block, Node};
 use crate::geom::Ray;
 use crate::geom::triangle::ShearedRay;
-use glam::{DVec3, Vec4};
+use glam::{Vec3, Vec4};
 
 /// What box tests may be off by, as a factor: a difference, a reciprocal and a product are
 /// three roundings of 2^-24 at each end of the interval, 2^-20 is above both together.
 ///
 /// Source: T. Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013.
-const SLACK: f32 = 1.0 + 1.0 / (1 << 20) as f32;
+pub(super) const SLACK: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 
-/// A ray as boxes see it.
+/// A ray as boxes see it, in little memory.
 ///
 /// Its `t` counts in units of a power of two times the direction's length, so that no
 /// direction is too long or too short for f32.
 pub(super) struct BoxRay {
-    o: [Vec4; 3],
-    inv_d: [Vec4; 3],
+    pub(super) o: [f32; 3],
+    pub(super) inv_d: [f32; 3],
     /// Per axis, which side of a box the ray meets first.
-    near: [usize; 3],
-    t_near: Vec4,
+    pub(super) near: [u8; 3],
+    pub(super) t_near: f32,
     /// The `t` of boxes is `unit` times the ray's own.
     unit: f64,
+}
+
+/// A [`BoxRay`] for four boxes at once.
+pub(super) struct BoxRay4 {
+    o: [Vec4; 3],
+    inv_d: [Vec4; 3],
+    near: [usize; 3],
+    t_near: Vec4,
 }
 
 /// A ray as triangles see it.
 pub(super) struct TriangleRay {
     /// For the test in f64. Its interval holds the `t` whose f32 lies in the ray's.
     pub(super) exact: ShearedRay,
-    axes: [usize; 3],
-    o: [Vec4; 3],
-    shear: [Vec4; 2],
+    /// Origin in the order of the sheared axes.
+    o: [f32; 3],
+    shear: [f32; 2],
 }
 
-/// Prepares `ray`; `None` where it has no direction or is not finite, and meets nothing.
+/// Prepares `ray`; `None` where it meets nothing because it has no direction, is not finite
+/// or ends before it begins.
 pub(super) fn prepare(ray: &Ray) -> Option<(BoxRay, TriangleRay)> {
     let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
     let longest = d.abs().max_element();
-    if !(o.is_finite() && d.is_finite() && longest > 0.0) {
+    if !(o.is_finite() && d.is_finite() && longest > 0.0 && ray.t_near < ray.t_far) {
         return None;
     }
     // The power of two at or below the largest component: scaling by it is exact.
     let unit = f64::from_bits(longest.to_bits() & (0x7ff << 52));
     let (t_near, t_far) = interval(ray);
     let exact = ShearedRay::new(o, d, t_near, t_far);
-    Some((BoxRay::new(ray, d / unit, unit), TriangleRay::new(ray, d, exact)))
+    Some((BoxRay::new(ray, (d * (1.0 / unit)).as_vec3(), unit), TriangleRay::new(ray, exact)))
 }
 
 /// All `t` that lie between `t_near` and `t_far` once they are rounded to f32.
@@ -59,18 +68,25 @@ fn interval(ray: &Ray) -> (f64, f64) {
 
 impl BoxRay {
     /// `d` is the ray's direction divided by `unit`.
-    fn new(ray: &Ray, d: DVec3, unit: f64) -> Self {
+    fn new(ray: &Ray, d: Vec3, unit: f64) -> Self {
         // Infinite where the ray is parallel to the sides. A box side through the origin
         // then gives NaN, and lanes with NaN may turn out either way: boxes are wider than
         // what is in them, so an origin on a side is outside of that.
-        let inv_d = [0, 1, 2].map(|axis| (1.0 / d[axis]) as f32);
+        let inv_d = d.recip().to_array();
         Self {
-            o: ray.o.to_array().map(Vec4::splat),
-            inv_d: inv_d.map(Vec4::splat),
-            near: inv_d.map(|i| usize::from(i.is_sign_negative())),
-            t_near: Vec4::splat(((f64::from(ray.t_near) * unit) as f32).next_down()),
+            o: ray.o.to_array(),
+            inv_d,
+            near: inv_d.map(|i| u8::from(i.is_sign_negative())),
+            t_near: ((f64::from(ray.t_near) * unit) as f32).next_down(),
             unit,
         }
+    }
+
+    /// Whether both meet the same sides of boxes first, run parallel to none, and count `t`
+    /// alike.
+    pub(super) fn is_like(&self, o: &Self) -> bool {
+        // So large a reciprocal overflows when multiplied, but not to NaN: only infinity does.
+        self.near == o.near && self.unit == o.unit && self.inv_d.iter().all(|i| i.is_finite())
     }
 
     /// The `t` from where on no box matters once there is a hit at `t`.
@@ -79,6 +95,19 @@ impl BoxRay {
         (t * self.unit) as f32 * SLACK + f32::MIN_POSITIVE
     }
 
+    /// The same four times side by side.
+    #[inline]
+    pub(super) fn splat(&self) -> BoxRay4 {
+        BoxRay4 {
+            o: self.o.map(Vec4::splat),
+            inv_d: self.inv_d.map(Vec4::splat),
+            near: self.near.map(usize::from),
+            t_near: Vec4::splat(self.t_near),
+        }
+    }
+}
+
+impl BoxRay4 {
     /// Bits of the children whose boxes the ray meets up to `cull`, and where it enters them.
     #[inline]
     pub(super) fn enter(&self, node: &Node, cull: f32) -> (u32, [f32; 4]) {
@@ -92,15 +121,8 @@ impl BoxRay {
 }
 
 impl TriangleRay {
-    fn new(ray: &Ray, d: DVec3, exact: ShearedRay) -> Self {
-        let axes = exact.axes();
-        let [x, y, z] = axes;
-        Self {
-            exact,
-            axes,
-            o: axes.map(|axis| Vec4::splat(ray.o[axis])),
-            shear: [d[x] / d[z], d[y] / d[z]].map(|s| Vec4::splat(s as f32)),
-        }
+    fn new(ray: &Ray, exact: ShearedRay) -> Self {
+        Self { exact, o: exact.axes().map(|axis| ray.o[axis]), shear: exact.shear().map(|s| s as f32) }
     }
 
     /// Bits of the lanes of `block` that the ray's line may meet: all that the f64 test
@@ -115,7 +137,7 @@ impl TriangleRay {
     /// nothing is turned away.
     #[inline]
     pub(super) fn candidates(&self, block: &Block) -> u32 {
-        let [x, y, z] = self.axes;
+        let [x, y, z] = self.exact.axes();
         let project = |corner: &[Vec4; 3]| {
             let along = corner[z] - self.o[2];
             let a = corner[x] - self.o[0] - self.shear[0] * along;
@@ -134,5 +156,62 @@ impl TriangleRay {
         let least = u.min(v).min(w);
         let most = u.max(v).max(w);
         !((least.cmplt(-bound)) & (most.cmpgt(bound))).bitmask() & 0b1111
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::triangle;
+    use proptest::prelude::*;
+
+    fn point() -> impl Strategy<Value = Vec3> {
+        [-1f32..1.0, -1f32..1.0, -1f32..1.0].prop_map(Vec3::from)
+    }
+
+    proptest! {
+        /// Rays at edges, up to 1e-9 of the distance beside them, from near and far.
+        #[test]
+        fn the_filter_keeps_what_f64_lets_hit(
+            t in [point(), point(), point()], o in point(), far in -2i32..8, scale in -18i32..=17,
+            s in 0f32..=1.0, beside in point(), off in -9i32..0
+        ) {
+            let unit = 10f32.powi(scale);
+            let o = o * 10f32.powi(far);
+            let target = t[0].lerp(t[1], s) + beside * 10f32.powi(off);
+            let ray = Ray::new(o * unit, target - o);
+            prop_assume!(ray.d != Vec3::ZERO);
+            let (_, triangles) = prepare(&ray).expect("finite");
+            let mut block = Block::EMPTY;
+            let corners = t.map(|p| p * unit);
+            block.set(2, corners, 7);
+            if triangle::intersect(&triangles.exact, corners).is_some() {
+                prop_assert!(triangles.candidates(&block) & 0b100 != 0);
+            }
+        }
+    }
+
+    #[test]
+    fn the_filter_turns_away_what_is_clearly_missed() {
+        let mut block = Block::EMPTY;
+        for lane in 0..4 {
+            let p = Vec3::new(lane as f32, 0.0, 5.0);
+            block.set(lane, [p, p + 0.9 * Vec3::X, p + 0.9 * Vec3::Y], lane as u32);
+        }
+        for lane in 0..4 {
+            let ray = Ray::new(Vec3::new(lane as f32 + 0.3, 0.3, 0.0), Vec3::Z);
+            let (_, triangles) = prepare(&ray).expect("finite");
+            assert_eq!(triangles.candidates(&block), 1 << lane);
+        }
+    }
+
+    #[test]
+    fn the_interval_is_that_of_rounded_t() {
+        for (t_near, t_far) in [(0.0, f32::INFINITY), (1.0, 2.0), (0.1, 1e30), (1e-40, 1e-39)] {
+            let (near, far) = interval(&Ray { t_near, t_far, ..Ray::new(Vec3::ZERO, Vec3::X) });
+            assert!(near.next_up() as f32 > t_near && near.next_down() as f32 <= t_near);
+            assert!((far.next_down() as f32) < t_far || t_far.is_infinite());
+            assert!(far.next_up() as f32 >= t_far);
+        }
     }
 }
