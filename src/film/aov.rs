@@ -56,9 +56,22 @@ pub struct AovImage {
 }
 
 impl AovImage {
-    /// All zero.
+    /// As if nothing were hit: what a pixel keeps that is never rendered.
     #[must_use]
     pub fn new(kind: Aov, pixels: usize) -> Self {
-        Self { kind, data: vec![0.0; pixels * kind.channels()] }
+        let nothing = if kind == Aov::Depth { f32::INFINITY } else { 0.0 };
+        Self { kind, data: vec![nothing; pixels * kind.channels()] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pixel_that_is_never_rendered_is_a_miss() {
+        assert_eq!(AovImage::new(Aov::Depth, 2).data, [f32::INFINITY; 2]);
+        assert_eq!(AovImage::new(Aov::Normal, 1).data, [0.0; 3]);
+        assert_eq!(AovImage::new(Aov::Id, 1).data, [0.0; 2]);
     }
 }
