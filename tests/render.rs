@@ -31,14 +31,16 @@ fn ball() -> Object {
     let mut points = Vec::new();
     for i in 0..=rings {
         for j in 0..sectors {
-            let (a, b) = (i as f32 / rings as f32 * std::f32::consts::PI, j as f32 / sectors as f32 * std::f32::consts::TAU);
+            let (a, b) =
+                (i as f32 / rings as f32 * std::f32::consts::PI, j as f32 / sectors as f32 * std::f32::consts::TAU);
             let r = 1.0 + 0.1 * (5.0 * a).sin() * (7.0 * b).cos();
             points.push([r * a.sin() * b.cos(), r * a.cos(), r * a.sin() * b.sin()]);
         }
     }
     let at = |i: u32, j: u32| i * sectors + j % sectors;
     let quads = (0..rings).flat_map(|i| (0..sectors).map(move |j| (i, j)));
-    let faces = quads.flat_map(|(i, j)| [[at(i, j), at(i, j + 1), at(i + 1, j)], [at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)]]);
+    let faces = quads
+        .flat_map(|(i, j)| [[at(i, j), at(i, j + 1), at(i + 1, j)], [at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)]]);
     object(&points, faces.collect())
 }
 
@@ -150,8 +152,14 @@ fn facing_mirrors_go_on_to_the_depth_bound_and_the_rest_is_bounded() {
     let mut scene = scene(vec![square(-1.0), square(1.0)], vec![mirror]);
     scene.ambient = Vec3::splat(1.0);
     let eye = DVec3::new(0.0, 0.0, 0.5);
-    let look = CameraDesc { target: DVec3::new(1e-3, 0.0, -1.0), projection: Projection::Perspective { fov_deg: 1.0 }, ..camera(eye) };
-    let at = |k_max: u32, min_weight: f32| render(BackendKind::COMPILED[0], &scene, &look, &Job { k_max, min_weight, ..job(4, 4) });
+    let look = CameraDesc {
+        target: DVec3::new(1e-3, 0.0, -1.0),
+        projection: Projection::Perspective { fov_deg: 1.0 },
+        ..camera(eye)
+    };
+    let at = |k_max: u32, min_weight: f32| {
+        render(BackendKind::COMPILED[0], &scene, &look, &Job { k_max, min_weight, ..job(4, 4) })
+    };
     let full = at(64, 0.0);
     for c in &full.film.color {
         assert!((c[0] - 2.0).abs() < 1e-6, "1 + 1/2 + 1/4 + … = 2, not {}", c[0]);
@@ -184,7 +192,12 @@ fn a_glass_slab_shows_what_is_behind_it_and_a_furnace_loses_nothing() {
     let mut scene = scene(vec![ball()], vec![glass]);
     scene.background = Vec3::ONE;
     for &kind in BackendKind::COMPILED {
-        let outcome = render(kind, &scene, &camera(DVec3::new(0.0, 0.0, 5.0)), &Job { k_max: 1000, min_weight: 1e-9, ..job(24, 24) });
+        let outcome = render(
+            kind,
+            &scene,
+            &camera(DVec3::new(0.0, 0.0, 5.0)),
+            &Job { k_max: 1000, min_weight: 1e-9, ..job(24, 24) },
+        );
         for c in &outcome.film.color {
             assert!(c.iter().all(|v| (v - 1.0).abs() < 2e-6), "{kind:?}: {c:?}");
         }
@@ -257,7 +270,8 @@ fn both_backends_render_the_same_picture() {
 
 #[test]
 fn auxiliary_images_tell_what_was_hit() {
-    let mut scene = scene(vec![square(0.0)], vec![Material { diffuse: Vec3::new(0.7, 0.5, 0.3), ..Material::default() }]);
+    let mut scene =
+        scene(vec![square(0.0)], vec![Material { diffuse: Vec3::new(0.7, 0.5, 0.3), ..Material::default() }]);
     scene.frame = Frame { origin: DVec3::new(0.0, 0.0, 100.0), exponent: 3 };
     let eye = DVec3::new(0.0, 0.0, 140.0);
     let look = CameraDesc { target: DVec3::new(0.0, 0.0, 100.0), ..camera(eye) };
@@ -311,7 +325,8 @@ fn more_samples_come_nearer_to_the_truth() {
     let at = |spp: u32, seed: u32| render(kind, &scene, &camera, &Job { spp, seed, ..job(60, 40) }).film;
     let truth = at(1024, 99);
     let rmse = |f: &Film| {
-        let sum: f64 = f.color.iter().flatten().zip(truth.color.iter().flatten()).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+        let sum: f64 =
+            f.color.iter().flatten().zip(truth.color.iter().flatten()).map(|(a, b)| f64::from(a - b).powi(2)).sum();
         (sum / (3 * f.color.len()) as f64).sqrt()
     };
     let (few, many) = (rmse(&at(4, 1)), rmse(&at(64, 1)));
@@ -322,7 +337,13 @@ fn more_samples_come_nearer_to_the_truth() {
 
 #[test]
 fn a_lens_leaves_a_constant_plane_constant_and_blurs_what_is_out_of_focus() {
-    let flat = Material { emission: Vec3::new(0.3, 0.5, 0.7), ambient: Vec3::ZERO, diffuse: Vec3::ZERO, specular: Vec3::ZERO, ..Material::default() };
+    let flat = Material {
+        emission: Vec3::new(0.3, 0.5, 0.7),
+        ambient: Vec3::ZERO,
+        diffuse: Vec3::ZERO,
+        specular: Vec3::ZERO,
+        ..Material::default()
+    };
     let scene = scene(vec![square(0.0)], vec![flat]);
     let kind = BackendKind::COMPILED[0];
     let close = CameraDesc { aperture: 0.2, focus: Some(1.0), ..camera(DVec3::new(0.0, 0.0, 1.5)) };

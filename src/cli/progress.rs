@@ -223,6 +223,18 @@ impl View {
         parts.join("  ")
     }
 
+    /// `render ████░░░░  50 %  3.0 Mrays/s …`; nobody knows how much of the writing is done.
+    fn line(&self) -> String {
+        const WIDTH: usize = 32;
+        let (name, text) = (self.stage.name(), self.text());
+        if self.stage == Stage::Write {
+            return format!("{name:>6}  {text}");
+        }
+        let full = (self.share * WIDTH as f64) as usize;
+        let bar = "█".repeat(full) + &"░".repeat(WIDTH - full);
+        format!("{name:>6} {bar} {:>3.0} %  {text}", 100.0 * self.share)
+    }
+
     fn json(&self) -> serde_json::Value {
         json!({
             "stage": self.stage.name(),
@@ -237,20 +249,16 @@ impl View {
 
 impl Sink {
     fn bar() -> Self {
-        let bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::stderr());
-        let style = ProgressStyle::with_template("{prefix:>6} {bar:32} {percent:>3} %  {msg}");
-        Self::Bar(bar.with_style(style.expect("a constant that the tests draw")))
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+        // One field: each that is set would draw the line anew, half of it old.
+        Self::Bar(bar.with_style(ProgressStyle::with_template("{wide_msg}").expect("a constant that the tests draw")))
     }
 
     fn show(&mut self, view: &View) {
         // Nobody reads a stderr that is closed.
         let line = |text: String| drop(writeln!(io::stderr().lock(), "{text}"));
         match self {
-            Self::Bar(bar) => {
-                bar.set_prefix(view.stage.name());
-                bar.set_message(view.text());
-                bar.set_position((1000.0 * view.share) as u64);
-            }
+            Self::Bar(bar) => bar.set_message(view.line()),
             Self::Plain { last } if last.elapsed() >= PLAIN_EVERY => {
                 *last = Instant::now();
                 let rays = if view.rays > 0 { format!("  {}", counted(view.rays, "ray")) } else { String::new() };
@@ -318,7 +326,8 @@ mod tests {
         let mut sink = Sink::bar();
         sink.show(&view);
         let Sink::Bar(bar) = &sink else { panic!("not a bar") };
-        assert_eq!(bar.position(), 500);
+        assert!(bar.message().starts_with("render ████████████████░░░░░░░░░░░░░░░░  50 %  3.0 Mrays/s"));
         bar.finish_and_clear();
+        assert!(!View { stage: Stage::Write, ..view }.line().contains('%'));
     }
 }

@@ -171,8 +171,27 @@ mod tests {
     #[test]
     fn bad_triangles_are_counted_by_reason_and_keep_their_place() {
         let points = vec![
-            0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 2.0, 0.0, 0.0, f32::NAN, 0.0, 0.0, f32::INFINITY, 0.0,
-            0.0, 2e18, 0.0, 0.0,
+            0.0,
+            0.0,
+            0.0,
+            1.0,
+            0.0,
+            0.0,
+            0.0,
+            1.0,
+            0.0,
+            2.0,
+            0.0,
+            0.0,
+            f32::NAN,
+            0.0,
+            0.0,
+            f32::INFINITY,
+            0.0,
+            0.0,
+            2e18,
+            0.0,
+            0.0,
         ];
         let faces = vec![[0, 1, 2], [0, 1, 3], [0, 1, 4], [0, 5, 2], [0, 1, 7], [6, 1, 2], [1, 1, 2], [0, 2, 3]];
         let mesh = TriangleMesh::new(points, faces);

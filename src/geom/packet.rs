@@ -284,9 +284,6 @@ impl<P: RayQueue> PacketBatch<P> {
     /// Each packet in use with the number of its lanes that hold a ray (the first ones).
     pub fn packets_mut(&mut self) -> impl Iterator<Item = (&mut P, usize)> {
         let len = self.len;
-        self.packets[..len.div_ceil(LANES)]
-            .iter_mut()
-            .enumerate()
-            .map(move |(i, p)| (p, (len - i * LANES).min(LANES)))
+        self.packets[..len.div_ceil(LANES)].iter_mut().enumerate().map(move |(i, p)| (p, (len - i * LANES).min(LANES)))
     }
 }

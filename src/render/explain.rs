@@ -67,7 +67,8 @@ impl<B: Backend> Teller<'_, B> {
         if told > MOST_RAYS {
             writeln!(out, "… and {} rays more", told - MOST_RAYS).expect("a string takes everything");
         }
-        writeln!(out, "colour {:.6} {:.6} {:.6} (linear)", color.x, color.y, color.z).expect("a string takes everything");
+        writeln!(out, "colour {:.6} {:.6} {:.6} (linear)", color.x, color.y, color.z)
+            .expect("a string takes everything");
         Ok(out)
     }
 
@@ -87,7 +88,16 @@ impl<B: Backend> Teller<'_, B> {
         let far = (point.p - this.ray.o.as_dvec3()).length() * self.scene.frame.world_per_local();
         *out += &format!(
             "{indent}{} weight {weight:.4}: object {} triangle {} '{}' at {:.9} {:.9} {:.9}, distance {far:.9}, normal {:.6} {:.6} {:.6}, {}\n",
-            this.what, hit.geom_id, hit.prim_id, m.name, p.x, p.y, p.z, point.ns.x, point.ns.y, point.ns.z,
+            this.what,
+            hit.geom_id,
+            hit.prim_id,
+            m.name,
+            p.x,
+            p.y,
+            p.z,
+            point.ns.x,
+            point.ns.y,
+            point.ns.z,
             if point.entering { "outside" } else { "inside" },
         );
         let own = m.emission + m.ambient * self.scene.ambient;

@@ -102,7 +102,8 @@ impl<const SPECULAR: bool> Kernel for Add<'_, SPECULAR> {
         }
         for k in 0..3 {
             let color = self.light.color[k];
-            let add: F32 = std::array::from_fn(|i| color * (b.diffuse[k][i] * diffuse[i] + b.specular[k][i] * specular[i]));
+            let add: F32 =
+                std::array::from_fn(|i| color * (b.diffuse[k][i] * diffuse[i] + b.specular[k][i] * specular[i]));
             for i in 0..LANES {
                 b.color[k][i] += add[i];
             }

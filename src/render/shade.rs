@@ -23,11 +23,8 @@ pub fn branches(material: &Material, point: &SurfacePoint, d: DVec3) -> (Option<
     let n = if point.ns.dot(d) < 0.0 { point.ns } else { point.ng };
     let cos_i = -n.dot(d);
     let eta = if point.entering { 1.0 / material.ior } else { material.ior };
-    let refraction = if material.refracts() || material.reflect == Reflect::Fresnel {
-        optics::refract(d, n, eta)
-    } else {
-        None
-    };
+    let refraction =
+        if material.refracts() || material.reflect == Reflect::Fresnel { optics::refract(d, n, eta) } else { None };
     let (mut mirrored, mut passed) = match material.reflect {
         Reflect::Constant(weight) => (weight, material.refract),
         Reflect::Metal(color) => (color + (Vec3::ONE - color) * optics::schlick(cos_i) as f32, material.refract),
@@ -42,7 +39,8 @@ pub fn branches(material: &Material, point: &SurfacePoint, d: DVec3) -> (Option<
     if refraction.is_none() {
         passed = Vec3::ZERO;
     }
-    let reflected = (mirrored != Vec3::ZERO).then(|| Branch { d: above(optics::reflect(d, n), point.ng, d), weight: mirrored });
+    let reflected =
+        (mirrored != Vec3::ZERO).then(|| Branch { d: above(optics::reflect(d, n), point.ng, d), weight: mirrored });
     let refracted = refraction.filter(|_| passed != Vec3::ZERO);
     (reflected, refracted.map(|r| Branch { d: below(r.direction, point.ng, d), weight: passed }))
 }
@@ -70,15 +68,7 @@ mod tests {
     use super::*;
 
     fn point(entering: bool) -> SurfacePoint {
-        SurfacePoint {
-            p: DVec3::ZERO,
-            ng: DVec3::Y,
-            ns: DVec3::Y,
-            to_eye: Vec3::Y,
-            extent: 1.0,
-            material: 0,
-            entering,
-        }
+        SurfacePoint { p: DVec3::ZERO, ng: DVec3::Y, ns: DVec3::Y, to_eye: Vec3::Y, extent: 1.0, material: 0, entering }
     }
 
     fn glass(reflect: Reflect) -> Material {

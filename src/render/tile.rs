@@ -54,7 +54,11 @@ pub fn segments(pixels: &[(u32, u32)], spp: u32) -> impl Iterator<Item = Segment
     let samples = spp.min(LANES as u32);
     let at_once = SEGMENT / samples as usize;
     pixels.chunks(at_once).flat_map(move |pixels| {
-        (0..spp).step_by(samples as usize).map(move |first| Segment { pixels, first, samples: samples.min(spp - first) })
+        (0..spp).step_by(samples as usize).map(move |first| Segment {
+            pixels,
+            first,
+            samples: samples.min(spp - first),
+        })
     })
 }
 

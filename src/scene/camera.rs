@@ -248,7 +248,8 @@ mod tests {
         for d in [desc(), lens, CameraDesc { projection: Projection::Orthographic { height: 3.0 }, ..lens }] {
             let camera = d.prepare(&frame(), (64, 48)).expect("a good camera");
             let at = [std::array::from_fn(|i| i as f64 * 3.7), std::array::from_fn(|i| 40.0 - i as f64 * 2.1)];
-            let disc = [std::array::from_fn(|i| (i as f64).sin() * 0.7), std::array::from_fn(|i| (i as f64).cos() * 0.7)];
+            let disc =
+                [std::array::from_fn(|i| (i as f64).sin() * 0.7), std::array::from_fn(|i| (i as f64).cos() * 0.7)];
             let mut packet = RayPacket::EMPTY;
             crate::simd::run(CameraRays { camera: &camera, at: &at, lens: &disc, packet: &mut packet });
             for i in 0..LANES {

@@ -82,7 +82,8 @@ impl Scene {
         let unit_up = up.try_normalize().ok_or("the camera's up direction is zero")?;
         let back = view.direction(unit_up);
         // Straight from above or below, the picture's top is the scene's back.
-        let level = if back.cross(unit_up).length() > 1e-6 { up } else { -View::Front.direction(unit_up) * back.dot(unit_up) };
+        let level =
+            if back.cross(unit_up).length() > 1e-6 { up } else { -View::Front.direction(unit_up) * back.dot(unit_up) };
         let center = self.bounds().center();
         let mut desc = CameraDesc {
             eye: center + back,

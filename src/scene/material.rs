@@ -38,14 +38,14 @@ pub enum Reflect {
 }
 
 impl Default for Material {
-    /// A light grey plastic.
+    /// Light clay with a soft highlight.
     fn default() -> Self {
         Self {
             name: "default".into(),
-            ambient: Vec3::splat(0.75),
-            diffuse: Vec3::splat(0.75),
-            specular: Vec3::splat(0.15),
-            shininess: 40.0,
+            ambient: Vec3::new(0.62, 0.60, 0.57),
+            diffuse: Vec3::new(0.62, 0.60, 0.57),
+            specular: Vec3::splat(0.12),
+            shininess: 30.0,
             emission: Vec3::ZERO,
             reflect: Reflect::NONE,
             refract: Vec3::ZERO,
@@ -105,6 +105,9 @@ impl Material {
 impl From<&MtlMaterial> for Material {
     /// What an MTL entry means here: `illum` decides which of its colours count.
     fn from(m: &MtlMaterial) -> Self {
+        if *m == MtlMaterial::named(m.name.clone()) {
+            return Self { name: m.name.clone(), ..Self::default() };
+        }
         let illum = m.illum.unwrap_or(if m.ks.is_some() { 2 } else { 1 });
         let color = Vec3::from(m.kd.unwrap_or([0.75; 3]));
         let ks = Vec3::from(m.ks.unwrap_or([0.0; 3]));

@@ -54,7 +54,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let rays: usize = tape.iter().map(Recording::rays).sum();
     let raw = RawScene::build(&scene, threads, low);
 
-    println!("{} triangles, {rays} rays in {} batches, {threads} threads, {}", scene.counts().triangles, tape.len(), backend.details());
+    println!(
+        "{} triangles, {rays} rays in {} batches, {threads} threads, {}",
+        scene.counts().triangles,
+        tape.len(),
+        backend.details()
+    );
     println!("round   render Mrays/s   bare Mrays/s   ratio");
     let mut ratios = Vec::new();
     let (mut best_render, mut best_bare) = (0f64, 0f64);
@@ -72,7 +77,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         best_bare = best_bare.max(bare);
     }
     ratios.sort_by(f64::total_cmp);
-    println!("median of ratios {:.3}; best render {best_render:.2}, best bare {best_bare:.2} Mrays/s", ratios[ratios.len() / 2]);
+    println!(
+        "median of ratios {:.3}; best render {best_render:.2}, best bare {best_bare:.2} Mrays/s",
+        ratios[ratios.len() / 2]
+    );
     Ok(())
 }
 
@@ -207,7 +215,12 @@ impl RawScene {
     }
 
     /// Copies the mesh into buffers of Embree's own.
-    fn attach(device: sys::RTCDevice, scene: sys::RTCScene, mesh: &tison::geom::TriangleMesh, quality: sys::RTCBuildQuality) {
+    fn attach(
+        device: sys::RTCDevice,
+        scene: sys::RTCScene,
+        mesh: &tison::geom::TriangleMesh,
+        quality: sys::RTCBuildQuality,
+    ) {
         // SAFETY: the device is live.
         let geometry = unsafe { sys::rtcNewGeometry(device, sys::RTCGeometryType::RTC_GEOMETRY_TYPE_TRIANGLE) };
         // SAFETY: the geometry is live.
@@ -250,7 +263,12 @@ impl RawScene {
         spent.iter().sum::<Duration>() / threads as u32
     }
 
-    fn timed<P: RayQueue>(&self, from: &PacketBatch<P>, to: &mut PacketBatch<P>, call: fn(&Self, &mut P, usize)) -> Duration {
+    fn timed<P: RayQueue>(
+        &self,
+        from: &PacketBatch<P>,
+        to: &mut PacketBatch<P>,
+        call: fn(&Self, &mut P, usize),
+    ) -> Duration {
         to.clone_from(from);
         let started = Instant::now();
         for (packet, live) in to.packets_mut() {
