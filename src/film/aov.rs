@@ -11,6 +11,7 @@ pub enum Aov {
     /// Mean diffuse colour, linear RGB.
     Albedo,
     /// Object and primitive of the first sample, each plus one; zero where it hit nothing.
+    /// Whole numbers, kept as the bits of the floats.
     Id,
     /// Share of the samples that hit something, 0 to 1.
     Hits,

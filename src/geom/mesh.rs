@@ -56,7 +56,7 @@ impl TriangleMesh {
     /// indices replaced by [`BAD_FACE`].
     #[must_use]
     pub fn new(mut points: Vec<f32>, mut faces: Vec<[u32; 3]>) -> Self {
-        if points.len() % 3 == 0 {
+        if points.len().is_multiple_of(3) {
             points.push(0.0);
         }
         const CHUNK: usize = 1 << 14;

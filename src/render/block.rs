@@ -2,6 +2,8 @@
 //!
 //! Loops over the lanes have no branch and no call, so that they compile to vector code.
 
+#![expect(clippy::needless_range_loop, reason = "an index runs over many arrays at once")]
+
 use crate::geom::{BAD_FACE, Hit, LANES, Ray};
 use crate::scene::{Material, Object, Scene};
 use crate::simd::{self, Kernel};

@@ -1,5 +1,7 @@
 //! One light over a block of hits: its shadow rays, and what it adds where they get through.
 
+#![expect(clippy::needless_range_loop, reason = "an index runs over many arrays at once")]
+
 use super::block::{Block, F32};
 use crate::geom::{LANES, RayPacket};
 use crate::math::pow01;

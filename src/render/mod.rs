@@ -105,7 +105,9 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
             while !self.control.is_cancelled() {
                 let index = next.fetch_add(1, Relaxed);
                 let Some(&tile) = tiles.get(index) else { break };
-                worker.render(tile);
+                if !worker.render(tile) {
+                    break;
+                }
                 let mut sum = sum.lock().unwrap_or_else(PoisonError::into_inner);
                 worker.hand_in(tile, index, &mut sum);
             }
@@ -180,7 +182,8 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
         }
     }
 
-    fn render(&mut self, tile: Crop) {
+    /// Whether the tile was finished, not given up on the way.
+    fn render(&mut self, tile: Crop) -> bool {
         let Render { camera, job, control, .. } = self.render;
         tile::pixels(tile, &mut self.pixels);
         self.sums.clear();
@@ -192,6 +195,10 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
         let pixels = std::mem::take(&mut self.pixels);
         let mut first_pixel = 0;
         for segment in tile::segments(&pixels, job.spp) {
+            // A tile of many samples takes long.
+            if control.is_cancelled() {
+                return false;
+            }
             let before = self.waves.tally.rays.total();
             segment.camera_rays(camera, job, &mut self.batch);
             self.waves.trace(&mut self.batch, Coherence::Coherent);
@@ -202,6 +209,7 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
             control.rays.fetch_add(self.waves.tally.rays.total() - before, Relaxed);
         }
         self.pixels = pixels;
+        true
     }
 
     /// Adds the samples of a segment to their pixels, in order.
@@ -282,7 +290,7 @@ impl FirstHits {
             Aov::Depth => set(&mut image.data, &[(self.depth / hits) as f32]),
             Aov::Normal => set(&mut image.data, &(self.normal / hits).as_vec3().to_array()),
             Aov::Albedo => set(&mut image.data, &(self.albedo / spp as f32).to_array()),
-            Aov::Id => set(&mut image.data, &self.id.map(|i| i as f32)),
+            Aov::Id => set(&mut image.data, &self.id.map(f32::from_bits)),
             Aov::Hits => set(&mut image.data, &[self.hits as f32 / spp as f32]),
             Aov::Cost => set(&mut image.data, &[self.cost as f32]),
         }

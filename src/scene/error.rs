@@ -44,9 +44,9 @@ pub enum Error {
     },
     /// A file names another one outside the folders it may read from.
     #[error(
-        "{}:{line}: {} is outside the folder of the file that names it; \
-         to read it, pass --allow-path {}",
-        path.display(), target.display(), folder.display()
+        "{}:{line}: {} is outside the folder of the file that names it and is not read; \
+         copy it into that folder and name it there",
+        path.display(), target.display()
     )]
     Forbidden {
         /// The file that names it.
@@ -55,8 +55,6 @@ pub enum Error {
         line: u64,
         /// What it names, links resolved.
         target: PathBuf,
-        /// Folder of `target`.
-        folder: PathBuf,
     },
     /// Faces, but none that a ray could meet.
     #[error("{}: none of its {faces} triangles can be hit: they have no area or lie out of range", path.display())]

@@ -141,9 +141,13 @@ fn info_tells_what_is_there() {
     let bench = Bench::new();
     let out = bench.expect("info a.obj", 0);
     let told = text(&out.stdout);
-    for want in
-        ["triangles  4", "vertices   4", "0, 0, 0 to 1, 1, 1", "needs      shadow rays", "needs not  reflection"]
-    {
+    for want in [
+        "triangles  4",
+        "vertices   4",
+        "0, 0, 0 to 1, 1, 1",
+        "needs      specular, shadow rays",
+        "needs not  reflection",
+    ] {
         assert!(told.contains(want), "{want} in\n{told}");
     }
     let info: Value = serde_json::from_slice(&bench.expect("info a.obj --json", 0).stdout).unwrap();

@@ -75,10 +75,11 @@ fn step(share: f32) -> u8 {
 
 /// A colour that tells neighbours apart: the three bytes of a hash, none darker than 64.
 fn id_colour([object, prim]: [f32; 2]) -> [u8; 3] {
-    if object == 0.0 && prim == 0.0 {
+    let (object, prim) = (object.to_bits(), prim.to_bits());
+    if object == 0 && prim == 0 {
         return [0; 3];
     }
-    let hash = mix(mix(object as u32) ^ prim as u32);
+    let hash = mix(mix(object) ^ prim);
     [0, 8, 16].map(|shift| 64 + ((hash >> shift & 0xff) * 191 / 255) as u8)
 }
 
@@ -119,7 +120,7 @@ mod tests {
     #[test]
     fn ids_that_differ_have_colours_that_differ() {
         assert_eq!(bytes(&image(Aov::Id, &[0.0, 0.0])), [[0; 3]]);
-        let pairs: Vec<f32> = (0..64).flat_map(|i| [1.0 + (i / 8) as f32, 1.0 + (i % 8) as f32]).collect();
+        let pairs: Vec<f32> = (0..64).flat_map(|i| [1 + i / 8, 1 + i % 8]).map(f32::from_bits).collect();
         let mut colours = bytes(&image(Aov::Id, &pairs));
         assert!(colours.iter().flatten().all(|&b| b >= 64));
         colours.sort_unstable();
@@ -134,7 +135,7 @@ mod tests {
                 Aov::Depth => vec![0.5, f32::INFINITY],
                 Aov::Normal => vec![-1.0, 0.0, 1.0],
                 Aov::Albedo => vec![0.0, 0.5, 1.0],
-                Aov::Id => vec![3.0, 70_000.0],
+                Aov::Id => vec![f32::from_bits(3), f32::from_bits(u32::MAX)],
                 Aov::Hits | Aov::Cost => vec![0.0, 1.0],
             };
             let shown = linear(&AovImage { kind, data });

@@ -25,7 +25,7 @@ pub fn aov_channels(aov: &AovImage) -> Vec<AnyChannel<FlatSamples>> {
         Aov::Hits => split(&aov.data, &["hits"]),
         Aov::Cost => split(&aov.data, &["cost"]),
         Aov::Id => {
-            let whole = |i: usize| FlatSamples::U32(aov.data.iter().skip(i).step_by(2).map(|&v| v as u32).collect());
+            let whole = |i: usize| FlatSamples::U32(aov.data.iter().skip(i).step_by(2).map(|&v| v.to_bits()).collect());
             vec![AnyChannel::new("id.object", whole(0)), AnyChannel::new("id.primitive", whole(1))]
         }
     }

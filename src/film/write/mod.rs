@@ -73,15 +73,20 @@ pub fn encode(film: &Film, format: Format, notes: &Notes, out: &mut dyn Sink) ->
 
 /// Writes one auxiliary image.
 ///
-/// PFM and EXR hold the values themselves (in PFM ids are object, primitive, 0). The others
+/// PFM and EXR hold the values themselves (in PFM ids are the floats object, primitive, 0, exact up to 2^24). The others
 /// show them: `display` says how.
 fn encode_aov(film: &Film, aov: &AovImage, format: Format, notes: &Notes, out: &mut dyn Sink) -> io::Result<()> {
     let (width, height) = (film.width, film.height);
     match format {
         Format::Exr => exr::write(width, height, exr::aov_channels(aov), notes, out),
         Format::Pfm if aov.kind == Aov::Id => {
-            let padded: Vec<[f32; 3]> =
-                aov.data.as_chunks().0.iter().map(|&[object, prim]| [object, prim, 0.0]).collect();
+            let padded: Vec<[f32; 3]> = aov
+                .data
+                .as_chunks()
+                .0
+                .iter()
+                .map(|&[object, prim]| [object.to_bits() as f32, prim.to_bits() as f32, 0.0])
+                .collect();
             float::pfm(width, 3, padded.as_flattened(), out)
         }
         Format::Pfm => float::pfm(width, aov.kind.channels(), &aov.data, out),

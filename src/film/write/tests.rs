@@ -16,7 +16,7 @@ fn film() -> Film {
             *v = match aov.kind {
                 Aov::Depth if i == 0 => f32::INFINITY,
                 Aov::Normal => (i as f32 / 22.0 - 1.0).clamp(-1.0, 1.0),
-                Aov::Id => 1.0 + i as f32 * 1000.0,
+                Aov::Id => f32::from_bits(1 + i as u32 * 1000),
                 Aov::Hits | Aov::Albedo => i as f32 / 45.0,
                 _ => i as f32 + 0.5,
             };
@@ -126,7 +126,10 @@ fn exr_holds_every_value_of_every_channel() {
     assert_eq!(channel("G"), &film.color.iter().map(|c| c[1]).collect::<Vec<_>>());
     assert_eq!(channel("Z"), aov(Aov::Depth));
     assert_eq!(channel("normal.Y"), &aov(Aov::Normal).iter().skip(1).step_by(3).copied().collect::<Vec<_>>());
-    assert_eq!(channel("id.primitive"), &aov(Aov::Id).iter().skip(1).step_by(2).copied().collect::<Vec<_>>());
+    assert_eq!(
+        channel("id.primitive"),
+        &aov(Aov::Id).iter().skip(1).step_by(2).map(|v| v.to_bits() as f32).collect::<Vec<_>>()
+    );
 }
 
 fn exr_channels(bytes: Vec<u8>) -> Vec<(String, Vec<f32>)> {

@@ -183,8 +183,7 @@ impl<'a> Finder<'a> {
             if self.allowed.iter().any(|folder| target.starts_with(folder)) {
                 return Ok(Some(target));
             }
-            let folder = target.parent().unwrap_or(Path::new("/")).to_owned();
-            return Err(Error::Forbidden { path: self.obj.to_owned(), line, target, folder });
+            return Err(Error::Forbidden { path: self.obj.to_owned(), line, target });
         }
         Ok(None)
     }
