@@ -5,6 +5,8 @@ mod format;
 mod save;
 mod write;
 
+use rayon::prelude::*;
+
 pub use aov::{Aov, AovImage};
 pub use format::Format;
 pub use save::{SaveError, Sink, abandon, check_target, is_special_file, save};
@@ -31,13 +33,10 @@ impl Film {
     #[must_use]
     pub fn new(width: u32, height: u32, aovs: &[Aov]) -> Self {
         let pixels = width as usize * height as usize;
-        Self {
-            width,
-            height,
-            color: vec![[0.0; 3]; pixels],
-            aovs: aovs.iter().map(|&kind| AovImage::new(kind, pixels)).collect(),
-            finished: 0,
-        }
+        // Filled on all threads: the first touch of fresh memory is most of the cost.
+        let mut color = vec![[0.0; 3]; pixels];
+        color.par_chunks_mut(1 << 14).for_each(|part| part.fill([0.0; 3]));
+        Self { width, height, color, aovs: aovs.iter().map(|&kind| AovImage::new(kind, pixels)).collect(), finished: 0 }
     }
 
     /// Bytes a film of this size takes, for refusing one before it is made.

@@ -4,8 +4,8 @@
 
 #![expect(clippy::needless_range_loop, reason = "an index runs over many arrays at once")]
 
-use crate::geom::{BAD_FACE, Hit, LANES, Ray};
-use crate::scene::{Material, Object, Scene};
+use crate::geom::{Hit, LANES, Ray, RayHitPacket};
+use crate::scene::{Material, Scene};
 use crate::simd::{self, Kernel};
 use glam::{DVec3, Vec3};
 
@@ -69,6 +69,8 @@ pub struct Facets {
     corners: [[F32; 3]; 3],
     normals: [[F32; 3]; 3],
     smooth: [bool; LANES],
+    geom: [u32; LANES],
+    prim: [u32; LANES],
 }
 
 /// Hits made into surface points, in scene space; f64 where a decision hangs on it. Lanes
@@ -112,36 +114,67 @@ pub struct Block {
 }
 
 impl Facets {
-    /// Lanes of zeros.
+    /// A good hit in every lane: lanes that no hit fills give numbers all the same, and a
+    /// packet with a NaN in it is slow to trace.
     pub const EMPTY: Self = Self {
-        o: [[0.0; LANES]; 3],
-        d: [[0.0; LANES]; 3],
-        reported: [[0.0; LANES]; 2],
-        corners: [[[0.0; LANES]; 3]; 3],
+        o: [[0.25; LANES], [0.25; LANES], [1.0; LANES]],
+        d: [[0.0; LANES], [0.0; LANES], [-1.0; LANES]],
+        reported: [[0.25; LANES]; 2],
+        corners: [
+            [[0.0; LANES]; 3],
+            [[1.0; LANES], [0.0; LANES], [0.0; LANES]],
+            [[0.0; LANES], [1.0; LANES], [0.0; LANES]],
+        ],
         normals: [[[0.0; LANES]; 3]; 3],
         smooth: [false; LANES],
+        geom: [0; LANES],
+        prim: [0; LANES],
     };
 
-    /// Looks up what belongs to `hit` of `ray`.
+    /// Takes over ray and hit `from` of `packet`.
     #[inline]
-    pub fn set(&mut self, lane: usize, object: &Object, ray: &Ray, hit: &Hit) {
-        let put = |to: &mut [F32; 3], v: Vec3| {
+    pub fn set(&mut self, lane: usize, packet: &RayHitPacket, from: usize) {
+        let ray = &packet.ray;
+        for (to, of) in self.o.iter_mut().zip([&ray.o_x, &ray.o_y, &ray.o_z]) {
+            to[lane] = of[from];
+        }
+        for (to, of) in self.d.iter_mut().zip([&ray.d_x, &ray.d_y, &ray.d_z]) {
+            to[lane] = of[from];
+        }
+        self.reported[0][lane] = packet.hit.u[from];
+        self.reported[1][lane] = packet.hit.v[from];
+        self.geom[lane] = packet.hit.geom_id[from];
+        self.prim[lane] = packet.hit.prim_id[from];
+    }
+
+    /// Looks up what belongs to the hits of the first `len` lanes: first where everything
+    /// is, then everything, so that the memory has many questions to work on at a time.
+    fn gather(&mut self, scene: &Scene, block: &mut Block, paints: &[Paint]) {
+        let mut faces = [[0; 3]; LANES];
+        let mut normals = [None; LANES];
+        for lane in 0..block.len {
+            let object = &scene.objects[self.geom[lane] as usize];
+            let prim = self.prim[lane];
+            faces[lane] = object.mesh.faces()[prim as usize];
+            block.material[lane] = object.material(prim) as u32;
+            normals[lane] = object.normals.as_ref().map(|n| n.of(object.mesh.faces(), prim as usize));
+        }
+        let put = |to: &mut [F32; 3], lane: usize, v: Vec3| {
             to[0][lane] = v.x;
             to[1][lane] = v.y;
             to[2][lane] = v.z;
         };
-        put(&mut self.o, ray.o);
-        put(&mut self.d, ray.d);
-        self.reported[0][lane] = hit.u;
-        self.reported[1][lane] = hit.v;
-        debug_assert_ne!(object.mesh.faces()[hit.prim_id as usize], BAD_FACE);
-        for (to, p) in self.corners.iter_mut().zip(object.mesh.triangle(hit.prim_id)) {
-            put(to, p);
-        }
-        let normals = object.corner_normals(hit.prim_id);
-        self.smooth[lane] = normals.is_some();
-        for (to, n) in self.normals.iter_mut().zip(normals.unwrap_or_default()) {
-            put(to, n);
+        for lane in 0..block.len {
+            let object = &scene.objects[self.geom[lane] as usize];
+            for (to, i) in self.corners.iter_mut().zip(faces[lane]) {
+                put(to, lane, object.mesh.point(i));
+            }
+            let normals = normals[lane].and_then(|at| object.normals_at(at));
+            self.smooth[lane] = normals.is_some();
+            for (to, n) in self.normals.iter_mut().zip(normals.unwrap_or_default()) {
+                put(to, lane, n);
+            }
+            block.paint(lane, &paints[block.material[lane] as usize]);
         }
     }
 }
@@ -167,36 +200,44 @@ impl Block {
         color: [[0.0; LANES]; 3],
     };
 
-    /// Notes where the colour of `lane` goes and what it is made of.
+    /// Notes where the colour of `lane` goes.
     #[inline]
-    pub fn set(&mut self, lane: usize, path: &Path, index: usize, material: &Paint) {
+    pub fn set(&mut self, lane: usize, path: &Path) {
         self.slot[lane] = path.slot;
         self.depth[lane] = path.depth;
-        self.material[lane] = index as u32;
-        self.shininess[lane] = material.shininess;
         for axis in 0..3 {
             self.weight[axis][lane] = path.weight[axis];
-            self.diffuse[axis][lane] = material.diffuse[axis];
-            self.specular[axis][lane] = material.specular[axis];
-            self.color[axis][lane] = material.own[axis];
         }
     }
 
-    /// Computes the points of all lanes.
-    pub fn finish(&mut self, facets: &Facets) {
+    #[inline]
+    fn paint(&mut self, lane: usize, paint: &Paint) {
+        self.shininess[lane] = paint.shininess;
+        for axis in 0..3 {
+            self.diffuse[axis][lane] = paint.diffuse[axis];
+            self.specular[axis][lane] = paint.specular[axis];
+            self.color[axis][lane] = paint.own[axis];
+        }
+    }
+
+    /// Makes the hits in the first `len` lanes of `facets` into points.
+    pub fn finish(&mut self, scene: &Scene, facets: &mut Facets, len: usize, paints: &[Paint]) {
+        self.len = len;
+        facets.gather(scene, self, paints);
         simd::run(Finish { facets, block: self });
     }
 
-    /// One hit by itself.
+    /// One hit by itself, in lane 0.
     #[must_use]
     pub fn single(scene: &Scene, ray: &Ray, hit: &Hit) -> Self {
         let (mut facets, mut block) = (Facets::EMPTY, Self::EMPTY);
-        let object = &scene.objects[hit.geom_id as usize];
-        let material = object.material(hit.prim_id);
-        facets.set(0, object, ray, hit);
-        block.set(0, &Path::of_sample(0), material, &Paint::new(&scene.materials[material], scene.ambient));
-        block.len = 1;
-        block.finish(&facets);
+        let mut packet = RayHitPacket::EMPTY;
+        packet.ray.set(0, ray);
+        packet.set_hit(0, Some(hit));
+        facets.set(0, &packet, 0);
+        block.set(0, &Path::of_sample(0));
+        let paints: Vec<Paint> = scene.materials.iter().map(|m| Paint::new(m, scene.ambient)).collect();
+        block.finish(scene, &mut facets, 1, &paints);
         block
     }
 

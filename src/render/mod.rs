@@ -262,12 +262,14 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
         let width = sum.film.width as usize;
         let at = |(x, y): (u32, u32)| (y - crop.y0) as usize * width + (x - crop.x0) as usize;
         for (&xy, pixel) in self.pixels.iter().zip(&self.sums) {
-            let color = pixel.color / f64::from(pixel.counted.max(1));
+            let color = if spp == 1 { pixel.color } else { pixel.color / f64::from(pixel.counted.max(1)) };
             sum.film.color[at(xy)] = color.as_vec3().to_array();
             sum.non_finite += u64::from(spp - pixel.counted);
-            let cut = pixel.cut / f64::from(spp);
-            sum.cut_max = sum.cut_max.max(cut);
-            sum.cut_of_tile[index] += cut;
+            if SECONDARY {
+                let cut = pixel.cut / f64::from(spp);
+                sum.cut_max = sum.cut_max.max(cut);
+                sum.cut_of_tile[index] += cut;
+            }
         }
         for (&xy, pixel) in self.pixels.iter().zip(&self.first_hits) {
             sum.film.aovs.iter_mut().for_each(|image| pixel.write(image, at(xy), spp));

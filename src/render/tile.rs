@@ -11,7 +11,7 @@ use glam::DVec2;
 pub const TILE: u32 = 32;
 
 /// Camera rays of one wave: what fits in the second-level cache with its answers.
-const SEGMENT: usize = 4096;
+const SEGMENT: usize = 256;
 
 /// Where a lone sample goes through its pixel: beside the centre, so that a camera aligned
 /// with a mesh does not send every ray at a vertex or along an edge.
@@ -30,11 +30,31 @@ pub fn tiles(crop: Crop) -> Vec<Crop> {
 
 /// Pixels of a tile along a Z-curve, so that any 4 or 16 in a row form a square.
 pub fn pixels(tile: Crop, out: &mut Vec<(u32, u32)>) {
-    let even_bits = |i: u32| (0..5).fold(0, |a, b| a | ((i >> (2 * b)) & 1) << b);
-    let all = (0..TILE * TILE).map(|i| (tile.x0 + even_bits(i), tile.y0 + even_bits(i >> 1)));
     out.clear();
-    out.extend(all.filter(|&(x, y)| x < tile.x1 && y < tile.y1));
+    let whole = (tile.x1 - tile.x0, tile.y1 - tile.y0) == (TILE, TILE);
+    for &(dx, dy) in &Z_CURVE {
+        let (x, y) = (tile.x0 + u32::from(dx), tile.y0 + u32::from(dy));
+        if whole || (x < tile.x1 && y < tile.y1) {
+            out.push((x, y));
+        }
+    }
 }
+
+/// The way through a tile: even bits of the index are x, odd ones y.
+static Z_CURVE: [(u8, u8); (TILE * TILE) as usize] = {
+    let mut curve = [(0, 0); (TILE * TILE) as usize];
+    let mut i = 0;
+    while i < curve.len() {
+        let mut bit = 0;
+        while bit < 5 {
+            curve[i].0 |= ((i >> (2 * bit) & 1) << bit) as u8;
+            curve[i].1 |= ((i >> (2 * bit + 1) & 1) << bit) as u8;
+            bit += 1;
+        }
+        i += 1;
+    }
+    curve
+};
 
 /// Samples of a few neighbouring pixels that travel as one wave. Sample `j` of pixel `i` is
 /// ray `i * samples + j`, so the lanes of a packet hold a square of pixels, or many samples

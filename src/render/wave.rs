@@ -9,7 +9,7 @@ use super::shade::{self, Branch};
 use super::surface::SurfacePoint;
 use crate::backend::Backend;
 use crate::film::Aov;
-use crate::geom::{Coherence, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
+use crate::geom::{Coherence, INVALID_ID, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
 use crate::scene::{Light, Needs, Scene};
 use glam::{DVec3, Vec3};
 
@@ -104,8 +104,10 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         let samples = batch.len();
         self.gathered.color.clear();
         self.gathered.color.resize(samples, DVec3::ZERO);
-        self.gathered.cut.clear();
-        self.gathered.cut.resize(samples, 0.0);
+        if SECONDARY {
+            self.gathered.cut.clear();
+            self.gathered.cut.resize(samples, 0.0);
+        }
         if let Some(cost) = &mut self.gathered.cost {
             cost.clear();
             cost.resize(samples, 1);
@@ -144,17 +146,15 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             let live = (batch.len() - k * LANES).min(LANES);
             for i in 0..live {
                 let path = path(k * LANES + i);
-                let Some(hit) = packet.hit(i) else {
+                if packet.hit.geom_id[i] == INVALID_ID {
                     self.gathered.color[path.slot as usize] += (path.weight * self.scene.background).as_dvec3();
                     continue;
-                };
+                }
                 if self.used == self.blocks.len() {
                     self.blocks.push(Block::EMPTY);
                 }
-                let object = &self.scene.objects[hit.geom_id as usize];
-                let material = object.material(hit.prim_id);
-                self.facets.set(lane, object, &packet.ray.get(i), &hit);
-                self.blocks[self.used].set(lane, &path, material, &self.paints[material]);
+                self.facets.set(lane, packet, i);
+                self.blocks[self.used].set(lane, &path);
                 lane += 1;
                 if lane == LANES {
                     self.finish_block(lane);
@@ -168,9 +168,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     }
 
     fn finish_block(&mut self, len: usize) {
-        let block = &mut self.blocks[self.used];
-        block.len = len;
-        block.finish(&self.facets);
+        self.blocks[self.used].finish(self.scene, &mut self.facets, len, &self.paints);
         self.used += 1;
     }
 

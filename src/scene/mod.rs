@@ -77,12 +77,12 @@ pub struct SceneCounts {
 }
 
 impl Object {
-    /// Normals at the corners of triangle `prim`; `None` unless all three have one.
+    /// The three normals with these numbers; `None` unless there are all three.
     #[inline]
     #[must_use]
-    pub fn corner_normals(&self, prim: u32) -> Option<[Vec3; 3]> {
+    pub fn normals_at(&self, numbers: [u32; 3]) -> Option<[Vec3; 3]> {
         let normals = self.normals.as_ref()?;
-        let [a, b, c] = normals.of(self.mesh.faces(), prim as usize).map(|i| normals.get::<3>(i).map(Vec3::from));
+        let [a, b, c] = numbers.map(|i| normals.get::<3>(i).map(Vec3::from));
         Some([a?, b?, c?])
     }
 

@@ -5,16 +5,15 @@
 //!     cargo bench --bench bare -- [MODEL.obj] [--size WxH] [--eye x,y,z] [--target x,y,z]
 //!                                 [--fov D] [--threads N] [--rounds N] [--triangles N]
 //!
-//! Without a model a displaced sphere is generated. The loop's time is that of the calls into
-//! Embree alone: packets are put into the cache before each tile's clock starts.
+//! Without a model a displaced sphere is generated.
 use embree4_sys as sys;
 use glam::DVec3;
 use std::path::PathBuf;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 use tison::backend::{AnyBackend, Backend, BackendKind, BuildOptions};
-use tison::geom::{Coherence, Hit, LANES, PacketBatch, Ray, RayHitPacket, RayPacket, RayQueue};
+use tison::geom::{Coherence, Hit, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
 use tison::render::{self, Control, Crop, Job};
 use tison::scene::{self, CameraOverrides, LoadOptions, Projection, Scene, View};
 
@@ -46,18 +45,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         progress: None,
     };
     let low = build.prefers_quick_build(&scene);
+    // Where in memory a hierarchy lies can double the cost of a ray: the bare loop has first choice.
+    let raw = RawScene::build(&scene, threads, low);
     let backend = AnyBackend::build(BackendKind::Embree, &scene, &build)?;
     let AnyBackend::Embree(embree) = &backend else { unreachable!("it was asked for") };
-    let recorder = Recorder { inner: embree, tape: Mutex::default() };
+    let recorder = Recorder { inner: embree, tapes: (0..threads).map(|_| Mutex::default()).collect() };
     render::run_with(&scene, &camera, &recorder, &job, &Control::default())?;
-    let tape = recorder.tape.into_inner()?;
-    let rays: usize = tape.iter().map(Recording::rays).sum();
-    let raw = RawScene::build(&scene, threads, low);
+    let fresh = recorder.tapes.into_iter().map(Mutex::into_inner).collect::<Result<Vec<_>, _>>()?;
+    let rays: usize = fresh.iter().flatten().map(Recording::rays).sum();
+    let tapes: Vec<_> = fresh.iter().map(|tape| Mutex::new(tape.clone())).collect();
 
     println!(
         "{} triangles, {rays} rays in {} batches, {threads} threads, {}",
         scene.counts().triangles,
-        tape.len(),
+        fresh.iter().map(Vec::len).sum::<usize>(),
         backend.details()
     );
     println!("round   render Mrays/s   bare Mrays/s   ratio");
@@ -66,7 +67,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for round in 0..=args.rounds {
         let outcome = render::run(&scene, &camera, &backend, &job, &Control::default())?;
         assert_eq!(outcome.stats.rays.total() as usize, rays, "both trace the same rays");
-        let bare = rays as f64 / raw.replay(&tape, threads).as_secs_f64() / 1e6;
+        // Last round's answers lie where the questions were.
+        rayon::broadcast(|t| tapes[t.index()].lock().expect("nobody panics with it").clone_from(&fresh[t.index()]));
+        let bare = rays as f64 / raw.replay(&tapes).as_secs_f64() / 1e6;
         let ours = rays as f64 / outcome.stats.seconds / 1e6;
         if round == 0 {
             continue; // warms the caches
@@ -143,6 +146,7 @@ fn point(text: &str) -> Result<DVec3, Box<dyn std::error::Error>> {
 }
 
 /// A batch as it reached the backend.
+#[derive(Clone)]
 enum Recording {
     Nearest(PacketBatch<RayHitPacket>),
     Any(PacketBatch<RayPacket>),
@@ -158,10 +162,18 @@ impl Recording {
     }
 }
 
-/// Answers through another backend and keeps a copy of every question.
+/// Answers through another backend and keeps a copy of every question, by the thread that
+/// asked: replayed so, neighbouring rays stay on one thread, as they do in a render.
 struct Recorder<'a, B> {
     inner: &'a B,
-    tape: Mutex<Vec<Recording>>,
+    tapes: Vec<Mutex<Vec<Recording>>>,
+}
+
+impl<B> Recorder<'_, B> {
+    fn keep(&self, recording: Recording) {
+        let thread = rayon::current_thread_index().expect("renders run on the pool");
+        self.tapes[thread].lock().expect("nobody panics with it").push(recording);
+    }
 }
 
 impl<B: Backend> Backend for Recorder<'_, B> {
@@ -172,11 +184,11 @@ impl<B: Backend> Backend for Recorder<'_, B> {
         self.inner.occluded(ray)
     }
     fn intersect_many(&self, rays: &mut PacketBatch<RayHitPacket>, coherence: Coherence) {
-        self.tape.lock().expect("nobody panics with it").push(Recording::Nearest(rays.clone()));
+        self.keep(Recording::Nearest(rays.clone()));
         self.inner.intersect_many(rays, coherence);
     }
     fn occluded_many(&self, rays: &mut PacketBatch<RayPacket>, coherence: Coherence) {
-        self.tape.lock().expect("nobody panics with it").push(Recording::Any(rays.clone()));
+        self.keep(Recording::Any(rays.clone()));
         self.inner.occluded_many(rays, coherence);
     }
 }
@@ -214,7 +226,7 @@ impl RawScene {
         Self { device, scene: raw }
     }
 
-    /// Copies the mesh into buffers of Embree's own.
+    /// Shares the mesh's buffers, as a user who counts bytes would.
     fn attach(
         device: sys::RTCDevice,
         scene: sys::RTCScene,
@@ -225,18 +237,14 @@ impl RawScene {
         let geometry = unsafe { sys::rtcNewGeometry(device, sys::RTCGeometryType::RTC_GEOMETRY_TYPE_TRIANGLE) };
         // SAFETY: the geometry is live.
         unsafe { sys::rtcSetGeometryBuildQuality(geometry, quality) };
-        let points = &mesh.padded_points()[..3 * mesh.vertex_count()];
-        let vertex = (sys::RTCBufferType::RTC_BUFFER_TYPE_VERTEX, sys::RTCFormat::RTC_FORMAT_FLOAT3);
-        // SAFETY: the geometry is live; Embree allocates and pads.
-        let to = unsafe { sys::rtcSetNewGeometryBuffer(geometry, vertex.0, 0, vertex.1, 12, mesh.vertex_count()) };
-        // SAFETY: the buffer holds as many floats as `points`.
-        unsafe { std::ptr::copy_nonoverlapping(points.as_ptr(), to.cast(), points.len()) };
-        let faces = mesh.faces();
-        let index = (sys::RTCBufferType::RTC_BUFFER_TYPE_INDEX, sys::RTCFormat::RTC_FORMAT_UINT3);
-        // SAFETY: as above.
-        let to = unsafe { sys::rtcSetNewGeometryBuffer(geometry, index.0, 0, index.1, 12, faces.len()) };
-        // SAFETY: the buffer holds as many triples as `faces`.
-        unsafe { std::ptr::copy_nonoverlapping(faces.as_ptr(), to.cast(), faces.len()) };
+        let share = |slot, format, data: *const std::ffi::c_void, count: usize| {
+            // SAFETY: `data` are `count` items of 12 bytes, the vertices followed by padding; the mesh outlives
+            // the scene, which `main` drops first.
+            unsafe { sys::rtcSetSharedGeometryBuffer(geometry, slot, 0, format, data, 0, 12, count) };
+        };
+        let (vertex, index) = (sys::RTCBufferType::RTC_BUFFER_TYPE_VERTEX, sys::RTCBufferType::RTC_BUFFER_TYPE_INDEX);
+        share(vertex, sys::RTCFormat::RTC_FORMAT_FLOAT3, mesh.padded_points().as_ptr().cast(), mesh.vertex_count());
+        share(index, sys::RTCFormat::RTC_FORMAT_UINT3, mesh.faces().as_ptr().cast(), mesh.face_count());
         // SAFETY: the geometry is live.
         unsafe { sys::rtcCommitGeometry(geometry) };
         // SAFETY: both are live; the scene takes a reference of its own.
@@ -245,36 +253,20 @@ impl RawScene {
         unsafe { sys::rtcReleaseGeometry(geometry) };
     }
 
-    /// Traces the tape; the time of the thread that spent most in Embree.
-    fn replay(&self, tape: &[Recording], threads: usize) -> Duration {
-        let next = AtomicUsize::new(0);
-        let spent = rayon::broadcast(|_| {
-            let (mut nearest, mut any) = (PacketBatch::default(), PacketBatch::default());
-            let mut spent = Duration::ZERO;
-            while let Some(recording) = tape.get(next.fetch_add(1, Relaxed)) {
-                spent += match recording {
-                    Recording::Nearest(b) => self.timed(b, &mut nearest, Self::intersect),
-                    Recording::Any(b) => self.timed(b, &mut any, Self::occluded),
-                };
+    /// Traces the tapes in place, each on its thread; the mean of the threads' times.
+    fn replay(&self, tapes: &[Mutex<Vec<Recording>>]) -> Duration {
+        let spent = rayon::broadcast(|thread| {
+            let mut tape = tapes[thread.index()].lock().expect("nobody panics with it");
+            let started = Instant::now();
+            for recording in tape.iter_mut() {
+                match recording {
+                    Recording::Nearest(b) => b.packets_mut().for_each(|(p, live)| self.intersect(p, live)),
+                    Recording::Any(b) => b.packets_mut().for_each(|(p, live)| self.occluded(p, live)),
+                }
             }
-            spent
+            started.elapsed()
         });
-        // Work is handed out in small pieces, so all end together: the mean is the wall time.
-        spent.iter().sum::<Duration>() / threads as u32
-    }
-
-    fn timed<P: RayQueue>(
-        &self,
-        from: &PacketBatch<P>,
-        to: &mut PacketBatch<P>,
-        call: fn(&Self, &mut P, usize),
-    ) -> Duration {
-        to.clone_from(from);
-        let started = Instant::now();
-        for (packet, live) in to.packets_mut() {
-            call(self, packet, live);
-        }
-        started.elapsed()
+        spent.iter().sum::<Duration>() / tapes.len() as u32
     }
 
     fn intersect(&self, packet: &mut RayHitPacket, live: usize) {
