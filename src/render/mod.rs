@@ -261,16 +261,19 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
         let (crop, spp) = (self.render.job.crop, self.render.job.spp);
         let width = sum.film.width as usize;
         let at = |(x, y): (u32, u32)| (y - crop.y0) as usize * width + (x - crop.x0) as usize;
+        let (mut counted, mut cut, mut cut_max) = (0, 0.0, 0f64);
         for (&xy, pixel) in self.pixels.iter().zip(&self.sums) {
             let color = if spp == 1 { pixel.color } else { pixel.color / f64::from(pixel.counted.max(1)) };
             sum.film.color[at(xy)] = color.as_vec3().to_array();
-            sum.non_finite += u64::from(spp - pixel.counted);
+            counted += u64::from(pixel.counted);
             if SECONDARY {
-                let cut = pixel.cut / f64::from(spp);
-                sum.cut_max = sum.cut_max.max(cut);
-                sum.cut_of_tile[index] += cut;
+                cut += pixel.cut;
+                cut_max = cut_max.max(pixel.cut);
             }
         }
+        sum.non_finite += self.pixels.len() as u64 * u64::from(spp) - counted;
+        sum.cut_max = sum.cut_max.max(cut_max / f64::from(spp));
+        sum.cut_of_tile[index] = cut / f64::from(spp);
         for (&xy, pixel) in self.pixels.iter().zip(&self.first_hits) {
             sum.film.aovs.iter_mut().for_each(|image| pixel.write(image, at(xy), spp));
         }
