@@ -52,6 +52,12 @@ pub fn load(path: &Path, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
     };
     let file = obj::read(path, &read)?;
     let mut warnings = file.warnings;
+    let textured = file.materials.iter().filter(|m| m.map_kd.is_some()).count();
+    if textured > 0 {
+        let what =
+            format!("{textured} of its materials name a texture (map_Kd); textures are not read, Kd is used alone");
+        warnings.push(Warning::about(path, what));
+    }
     let mesh = Arc::new(TriangleMesh::new(file.points, file.faces));
     if mesh.bounds().is_empty() {
         return Err(Error::NothingToHit { path: path.to_owned(), faces: mesh.face_count() });
