@@ -106,6 +106,12 @@ fn as_text(file: &Path, scene: &Scene) -> String {
         ),
     );
     row("vertices", grouped(c.vertices as u64));
+    // The mesh holds seven digits of its size; what stands behind them is rounding.
+    let decimals = 6 - b.size().max_element().log10().floor().clamp(-30.0, 6.0) as i32;
+    let point = |p: DVec3| {
+        let [x, y, z] = p.to_array().map(|v| rounded(v, decimals));
+        format!("{x}, {y}, {z}")
+    };
     row("bounds", format!("{} to {}", point(b.lo), point(b.hi)));
     row("size", point(b.size()));
     let names = |wanted: bool| {
@@ -151,6 +157,21 @@ fn colour(c: Vec3) -> String {
     format!("{},{},{}", c.x, c.y, c.z)
 }
 
-fn point(p: DVec3) -> String {
-    format!("{}, {}, {}", p.x, p.y, p.z)
+/// `v` with `decimals` digits behind the point, the last zeros left out.
+fn rounded(v: f64, decimals: i32) -> f64 {
+    format!("{v:.0$}", decimals.max(0) as usize).parse::<f64>().map_or(v, |r| r + 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_leaves_the_digits_that_count() {
+        assert_eq!(rounded(-1.600_000_023_841_858, 6).to_string(), "-1.6");
+        assert_eq!(rounded(4_649_776.220_000_1, 4).to_string(), "4649776.22");
+        assert_eq!(rounded(1.234_567_8e-9, 15).to_string(), "0.000000001234568");
+        assert_eq!(rounded(-1e-12, 6).to_string(), "0");
+        assert_eq!(rounded(f64::INFINITY, 3), f64::INFINITY);
+    }
 }
