@@ -5,8 +5,10 @@
 //! where it stands. [`Frame`] leads there and back.
 
 mod camera;
+pub mod desc;
 mod error;
 pub mod example;
+pub mod format;
 mod framing;
 mod light;
 mod load;
