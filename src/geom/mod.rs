@@ -1,14 +1,26 @@
-//! Rays, hits, packets and the primitives they meet. Knows `math` and nothing above it.
+//! Rays, hits, packets and the primitives they meet. Knows `math` and `simd`, nothing above them.
 
 mod bounds;
+mod cube;
+mod cylinder;
 mod mesh;
 mod offset;
 mod packet;
+mod quad;
 mod ray;
+mod shape;
+mod shape_set;
+mod sphere;
 pub mod triangle;
 
 pub use bounds::Bounds;
+pub use cube::Cube;
+pub use cylinder::Cylinder;
 pub use mesh::{BAD_FACE, Faults, TriangleMesh};
 pub use offset::offset_origin;
 pub use packet::{Coherence, HitLanes, LANES, PacketBatch, RayHitPacket, RayPacket, RayQueue};
+pub use quad::Quad;
 pub use ray::{Hit, INVALID_ID, Ray};
+pub use shape::{Lanes, Shape, ShapeError, ShapePoint};
+pub use shape_set::{Affine, Plain, ShapeSet};
+pub use sphere::Sphere;

@@ -1,0 +1,270 @@
+//! Many shapes of one class, as backends take them: a loop or callback per class, no dispatch per shape.
+
+use super::{Bounds, Lanes, Shape, ShapeError, ShapePoint};
+use crate::simd::{self, Kernel};
+use glam::{DAffine3, DMat3, DVec3};
+
+/// Primitives of one class in world space. Rays are given in world space, `d` of any length, and `t`
+/// counts in units of it.
+///
+/// # Panics
+/// The methods that take a `prim` panic if it is not below `len`.
+pub trait ShapeSet: Send + Sync {
+    /// Number of primitives.
+    fn len(&self) -> u32;
+
+    /// Whether there is none.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The tightest box around primitive `prim`, to f64 rounding: round it outwards.
+    fn bounds(&self, prim: u32) -> Bounds;
+
+    /// Parameter of the nearest hit in the open interval `(t_near, t_far)`.
+    fn hit(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t_far: f64) -> Option<f64>;
+
+    /// Whether anything of the primitive lies in the open interval.
+    fn occludes(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t_far: f64) -> bool {
+        self.hit(prim, o, d, t_near, t_far).is_some()
+    }
+
+    /// [`hit`](Self::hit) for `N` rays, the same bits: infinity in the lanes that miss, `None` when all do.
+    fn hit_lanes<T: Copy + Into<f64>, const N: usize>(&self, prim: u32, rays: &Lanes<'_, T, N>) -> Option<[f64; N]>
+    where
+        Self: Sized;
+
+    /// The surface point of a hit that a backend reported with parameter `t`, anew in f64 for the
+    /// same ray; see [`Shape::refine`].
+    fn refine(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t: f64) -> ShapePoint;
+}
+
+/// Number of a new primitive.
+///
+/// # Panics
+/// When it does not fit the 32 bits of a primitive id, the last of which means "none".
+fn next_id(len: usize) -> u32 {
+    u32::try_from(len).ok().filter(|&id| id < super::INVALID_ID).expect("fewer than 2^32 - 1 shapes fit in memory")
+}
+
+/// A packet of one: the single test leaves early, which the loop over lanes cannot.
+#[inline]
+fn one_lane<T: Copy + Into<f64>, const N: usize>(
+    set: &impl ShapeSet,
+    prim: u32,
+    rays: &Lanes<'_, T, N>,
+) -> Option<[f64; N]> {
+    set.hit(prim, rays.o(0), rays.d(0), rays.t_near(0), rays.t_far(0)).map(|t| [t; N])
+}
+
+/// Shapes whose own space is the world: spheres and axis-aligned boxes without a transform.
+#[derive(Clone, Debug)]
+pub struct Plain<S> {
+    shapes: Vec<S>,
+}
+
+impl<S> Default for Plain<S> {
+    fn default() -> Self {
+        Self { shapes: Vec::new() }
+    }
+}
+
+impl<S: Shape> Plain<S> {
+    /// Adds a shape and tells its number.
+    pub fn push(&mut self, shape: S) -> u32 {
+        let id = next_id(self.shapes.len());
+        self.shapes.push(shape);
+        id
+    }
+}
+
+impl<S: Shape> ShapeSet for Plain<S> {
+    fn len(&self) -> u32 {
+        self.shapes.len() as u32
+    }
+
+    fn bounds(&self, prim: u32) -> Bounds {
+        self.shapes[prim as usize].bounds(&DAffine3::IDENTITY)
+    }
+
+    #[inline]
+    fn hit(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t_far: f64) -> Option<f64> {
+        self.shapes[prim as usize].hit(o, d, t_near, t_far)
+    }
+
+    #[inline]
+    fn hit_lanes<T: Copy + Into<f64>, const N: usize>(&self, prim: u32, rays: &Lanes<'_, T, N>) -> Option<[f64; N]> {
+        if N == 1 {
+            return one_lane(self, prim, rays);
+        }
+        simd::run(PlainKernel { shape: &self.shapes[prim as usize], rays })
+    }
+
+    fn refine(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t: f64) -> ShapePoint {
+        self.shapes[prim as usize].refine(o, d, t_near, t)
+    }
+}
+
+struct PlainKernel<'a, S, T, const N: usize> {
+    shape: &'a S,
+    rays: &'a Lanes<'a, T, N>,
+}
+
+impl<S: Shape, T: Copy + Into<f64>, const N: usize> Kernel for PlainKernel<'_, S, T, N> {
+    type Output = Option<[f64; N]>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        self.shape.hit_lanes(self.rays)
+    }
+}
+
+/// Shapes under an affine transform each: rotated, stretched, sheared, mirrored, moved.
+#[derive(Clone, Debug)]
+pub struct Affine<S> {
+    placed: Vec<Placed<S>>,
+    to_world: Vec<DAffine3>,
+}
+
+/// All that a test of one shape reads.
+#[derive(Clone, Copy, Debug)]
+struct Placed<S> {
+    shape: S,
+    /// Inverse of the linear part.
+    inverse: DMat3,
+    translation: DVec3,
+}
+
+impl<S> Default for Affine<S> {
+    fn default() -> Self {
+        Self { placed: Vec::new(), to_world: Vec::new() }
+    }
+}
+
+impl<S: Shape> Affine<S> {
+    /// Adds `shape` as `to_world` places it and tells its number.
+    ///
+    /// # Errors
+    /// [`ShapeError::TransformNotFinite`], or [`ShapeError::Singular`] when the axes span less than 4e-15 of the
+    /// volume that they would at right angles, which rounding cannot tell from nothing.
+    pub fn push(&mut self, shape: S, to_world: DAffine3) -> Result<u32, ShapeError> {
+        let inverse = invert(&to_world)?;
+        let id = next_id(self.placed.len());
+        self.placed.push(Placed { shape, inverse, translation: to_world.translation });
+        self.to_world.push(to_world);
+        Ok(id)
+    }
+}
+
+impl<S: Shape> Placed<S> {
+    /// Subtraction first: an inverse with the translation folded in cancels for what is far from the origin.
+    /// `d` is not normalised, so that `t` is the same number in both spaces.
+    #[inline(always)]
+    fn local_ray(&self, o: DVec3, d: DVec3) -> (DVec3, DVec3) {
+        (self.inverse * (o - self.translation), self.inverse * d)
+    }
+}
+
+impl<S: Shape> ShapeSet for Affine<S> {
+    fn len(&self) -> u32 {
+        self.placed.len() as u32
+    }
+
+    fn bounds(&self, prim: u32) -> Bounds {
+        self.placed[prim as usize].shape.bounds(&self.to_world[prim as usize])
+    }
+
+    #[inline]
+    fn hit(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t_far: f64) -> Option<f64> {
+        let placed = &self.placed[prim as usize];
+        let (o, d) = placed.local_ray(o, d);
+        placed.shape.hit(o, d, t_near, t_far)
+    }
+
+    #[inline]
+    fn hit_lanes<T: Copy + Into<f64>, const N: usize>(&self, prim: u32, rays: &Lanes<'_, T, N>) -> Option<[f64; N]> {
+        if N == 1 {
+            return one_lane(self, prim, rays);
+        }
+        simd::run(AffineKernel { placed: &self.placed[prim as usize], rays })
+    }
+
+    fn refine(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t: f64) -> ShapePoint {
+        let placed = &self.placed[prim as usize];
+        let to_world = &self.to_world[prim as usize];
+        let (o, d) = placed.local_ray(o, d);
+        let local = placed.shape.refine(o, d, t_near, t);
+        let ng = normal_matrix(&to_world.matrix3) * local.ng;
+        ShapePoint {
+            p: to_world.matrix3 * local.p + to_world.translation,
+            ng: ng.normalize(),
+            extent: 0.5 * self.bounds(prim).size().max_element(),
+            ..local
+        }
+    }
+}
+
+struct AffineKernel<'a, S, T, const N: usize> {
+    placed: &'a Placed<S>,
+    rays: &'a Lanes<'a, T, N>,
+}
+
+impl<S: Shape, T: Copy + Into<f64>, const N: usize> Kernel for AffineKernel<'_, S, T, N> {
+    type Output = Option<[f64; N]>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let (mut o, mut d) = ([[0.0; N]; 3], [[0.0; N]; 3]);
+        let (mut t_near, mut t_far) = ([0.0; N], [0.0; N]);
+        for i in 0..N {
+            let (o_i, d_i) = self.placed.local_ray(self.rays.o(i), self.rays.d(i));
+            (o[0][i], o[1][i], o[2][i]) = o_i.into();
+            (d[0][i], d[1][i], d[2][i]) = d_i.into();
+            (t_near[i], t_far[i]) = (self.rays.t_near(i), self.rays.t_far(i));
+        }
+        self.placed.shape.hit_lanes(&Lanes { o: o.each_ref(), d: d.each_ref(), t_near: &t_near, t_far: &t_far })
+    }
+}
+
+/// Exact power of two near the largest entry of `m`: with it divided out, no determinant over- or underflows.
+fn magnitude(m: &DMat3) -> f64 {
+    let largest = m.to_cols_array().into_iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+    let exponent = (largest.to_bits() >> 52) as i32 - 1023;
+    2f64.powi(exponent.clamp(-1000, 1000))
+}
+
+/// Columns of the cofactor matrix.
+fn cofactors(m: &DMat3) -> DMat3 {
+    let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
+    DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y))
+}
+
+/// What takes normals to world space: the cofactor matrix with the determinant's sign, which is the
+/// inverse transpose up to a positive factor, without a division.
+fn normal_matrix(m: &DMat3) -> DMat3 {
+    let m = *m * (1.0 / magnitude(m));
+    let cof = cofactors(&m);
+    let det = m.x_axis.dot(cof.x_axis);
+    cof * det.signum()
+}
+
+/// Inverse of the linear part of `to_world`.
+fn invert(to_world: &DAffine3) -> Result<DMat3, ShapeError> {
+    /// Share of the box's volume that the rounding of the entries alone can make.
+    const NOTHING: f64 = 4e-15;
+    if !to_world.is_finite() {
+        return Err(ShapeError::TransformNotFinite);
+    }
+    let scale = 1.0 / magnitude(&to_world.matrix3);
+    let m = to_world.matrix3 * scale;
+    let cof = cofactors(&m);
+    let det = m.x_axis.dot(cof.x_axis);
+    let volume = det.abs() / (m.x_axis.length() * m.y_axis.length() * m.z_axis.length());
+    let inverse = cof.transpose() * (1.0 / det) * scale;
+    // A NaN, from an axis of length 0, is no volume either.
+    if volume >= NOTHING && inverse.is_finite() {
+        Ok(inverse)
+    } else {
+        Err(ShapeError::Singular { volume: if volume > 0.0 { volume } else { 0.0 } })
+    }
+}
