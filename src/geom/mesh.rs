@@ -9,7 +9,7 @@ use rayon::prelude::*;
 pub const BAD_FACE: [u32; 3] = [u32::MAX; 3];
 
 /// Largest coordinate that Embree takes; a triangle that goes beyond is dropped by it
-/// without a word (`embree.md` of Embree 4.3: `FLT_LARGE`).
+/// without a word (`FLT_LARGE` in its sources).
 const LARGEST: f32 = 1.844e18;
 
 /// Triangles over shared vertices. Frozen once made.

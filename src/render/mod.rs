@@ -23,7 +23,6 @@ use glam::{DVec3, Vec3};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
-use surface::SurfacePoint;
 use wave::{Tally, Waves};
 
 /// Renders on the current rayon pool. The same scene, job and backend give the same bytes,
@@ -237,20 +236,21 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
     /// What the auxiliary images show of the camera rays' hits.
     fn first_hits(&mut self, first_pixel: usize, segment: &tile::Segment<'_>) {
         let (scene, samples) = (self.render.scene, segment.samples as usize);
-        for slot in 0..self.batch.len() {
-            let sum = &mut self.first_hits[first_pixel + slot / samples];
-            if let Some(cost) = &self.waves.gathered.cost {
-                sum.cost += cost[slot];
+        let sums = &mut self.first_hits[first_pixel..];
+        if let Some(cost) = &self.waves.gathered.cost {
+            for (sum, cost) in sums.iter_mut().zip(cost.chunks_exact(samples)) {
+                sum.cost += cost.iter().sum::<u32>();
             }
+        }
+        for (slot, point) in self.waves.gathered.seen.iter().flatten() {
+            let slot = *slot as usize;
             let (packet, lane) = (&self.batch.packets()[slot / LANES], slot % LANES);
-            let Some(hit) = packet.hit(lane) else { continue };
-            let ray = packet.ray.get(lane);
-            let point = SurfacePoint::new(scene, &ray, &hit);
-            if slot % samples == 0 && segment.first == 0 {
-                sum.id = [hit.geom_id + 1, hit.prim_id + 1];
+            let sum = &mut sums[slot / samples];
+            if slot.is_multiple_of(samples) && segment.first == 0 {
+                sum.id = [packet.hit.geom_id[lane] + 1, packet.hit.prim_id[lane] + 1];
             }
             sum.hits += 1;
-            sum.depth += (point.p - ray.o.as_dvec3()).length() * scene.frame.world_per_local();
+            sum.depth += (point.p - packet.ray.get(lane).o.as_dvec3()).length() * scene.frame.world_per_local();
             sum.normal += point.ns;
             sum.albedo += scene.materials[point.material].diffuse;
         }

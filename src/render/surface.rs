@@ -1,8 +1,7 @@
-//! One shaded point by itself, as branches and auxiliary images ask for it.
+//! One surface point by itself, as branches and auxiliary images ask for it.
 
 use super::block::Block;
-use crate::geom::{Hit, Ray, offset_origin};
-use crate::scene::Scene;
+use crate::geom::offset_origin;
 use glam::{DVec3, Vec3};
 
 /// A lane of a [`Block`].
@@ -25,12 +24,6 @@ pub struct SurfacePoint {
 }
 
 impl SurfacePoint {
-    /// Widens `hit` of `ray`.
-    #[must_use]
-    pub fn new(scene: &Scene, ray: &Ray, hit: &Hit) -> Self {
-        Self::of_lane(&Block::single(scene, ray, hit), 0)
-    }
-
     /// Takes one out of a block.
     #[inline]
     #[must_use]

@@ -33,6 +33,8 @@ pub struct Gathered {
     pub cut: Vec<f64>,
     /// Rays sent for it, of all kinds; kept only if somebody asked.
     pub cost: Option<Vec<u32>>,
+    /// The hits of the camera rays with their samples, in order; kept only if somebody asked.
+    pub seen: Option<Vec<(u32, SurfacePoint)>>,
 }
 
 /// What was sent and what was left out.
@@ -78,6 +80,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     /// An integrator with empty buffers.
     pub fn new(scene: &'a Scene, backend: &'a B, job: &'a Job, needs: &Needs, radiance: &'a Radiance) -> Self {
         let cost = job.aovs.contains(&Aov::Cost).then(Vec::new);
+        let seen = job.aovs.iter().any(|&a| a != Aov::Cost).then(Vec::new);
         let lights = scene.lights.iter().filter(|l| needs.shadow_rays && l.color != Vec3::ZERO);
         Self {
             scene,
@@ -93,7 +96,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             shadows: PacketBatch::default(),
             shadowed: Vec::new(),
             waiting: Vec::new(),
-            gathered: Gathered { cost, ..Gathered::default() },
+            gathered: Gathered { cost, seen, ..Gathered::default() },
             tally: Tally::default(),
         }
     }
@@ -115,6 +118,12 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         self.tally.rays.camera += samples as u64;
         self.backend.intersect_many(batch, coherence);
         self.collect(batch, |i| Path::of_sample(i as u32));
+        if let Some(seen) = &mut self.gathered.seen {
+            seen.clear();
+            for block in &self.blocks[..self.used] {
+                seen.extend((0..block.len).map(|lane| (block.slot[lane], SurfacePoint::of_lane(block, lane))));
+            }
+        }
         self.shade();
         if SECONDARY {
             self.secondary_waves();
