@@ -225,7 +225,7 @@ fn the_scenes_of_the_course_are_read() {
         assert_eq!(desc.materials.len(), text.matches("\nMaterial").count(), "{path}");
         let r = &desc.render;
         assert!(r.course_rules && r.size == Some((640, 480)) && r.min_weight == Some(0.0), "{path}");
-        assert_eq!(desc.cameras[0].clip, Some((3.0, 20.0)), "{path}");
+        assert_eq!(desc.cameras[0].camera.clip, Some((3.0, 20.0)), "{path}");
     }
 }
 

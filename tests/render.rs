@@ -8,16 +8,29 @@ use tison::film::{Aov, Film};
 use tison::geom::TriangleMesh;
 use tison::math::Frame;
 use tison::render::{self, Control, Crop, Job, Outcome};
-use tison::scene::{CameraDesc, CameraOverrides, Light, Material, Object, Projection, Reflect, Scene, View};
+use tison::scene::desc::LensSampler;
+use tison::scene::{
+    CameraDesc, CameraOverrides, Light, Material, Mesh, MeshData, MeshPaint, Object, Projection, Reflect, Scene, View,
+};
 
 fn object(points: &[[f32; 3]], faces: Vec<[u32; 3]>) -> Object {
-    let mesh = Arc::new(TriangleMesh::new(points.concat(), faces));
-    Object { mesh, normals: None, face_materials: None }
+    let triangles = Arc::new(TriangleMesh::new(points.concat(), faces));
+    let data = Arc::new(MeshData { triangles, normals: None, uvs: None, face_materials: None });
+    Object::Mesh(Mesh { data, paint: MeshPaint::One(0), mirrored: false })
 }
 
 fn scene(objects: Vec<Object>, materials: Vec<Material>) -> Scene {
     let background = Vec3::new(0.1, 0.2, 0.3);
-    Scene { frame: Frame::IDENTITY, objects, materials, lights: vec![], ambient: Vec3::ZERO, background }
+    Scene {
+        frame: Frame::IDENTITY,
+        objects,
+        materials,
+        textures: vec![],
+        lights: vec![],
+        ambient: Vec3::ZERO,
+        background,
+        course_rules: false,
+    }
 }
 
 /// A square of side 2 in the plane z = 0 that faces +z, at height `z`.
@@ -52,6 +65,8 @@ fn camera(eye: DVec3) -> CameraDesc {
         projection: Projection::Perspective { fov_deg: 40.0 },
         aperture: 0.0,
         focus: None,
+        aspect: None,
+        clip: None,
     }
 }
 
@@ -64,6 +79,9 @@ fn job(w: u32, h: u32) -> Job {
         k_max: 8,
         min_weight: 0.0,
         centre: false,
+        lens_sampler: LensSampler::Concentric,
+        jitter_radius: 0.5,
+        light_samples: 1,
         aovs: vec![],
     }
 }
@@ -92,7 +110,7 @@ fn a_square_under_one_light_has_the_colours_of_the_formula() {
     };
     let mut scene = scene(vec![square(0.0)], vec![m.clone()]);
     scene.ambient = Vec3::splat(0.1);
-    let light = Light { position: DVec3::new(1.0, 2.0, 3.0), color: Vec3::new(1.0, 0.9, 0.8) };
+    let light = Light::constant(DVec3::new(1.0, 2.0, 3.0), Vec3::new(1.0, 0.9, 0.8));
     scene.lights = vec![light];
     let eye = DVec3::new(0.0, 0.0, 4.0);
     let (w, h) = (48, 32);
@@ -126,8 +144,8 @@ fn a_square_under_one_light_has_the_colours_of_the_formula() {
 fn a_roof_throws_a_shadow_and_light_from_behind_costs_no_ray() {
     let mut scene = scene(vec![square(0.0), square(1.0)], vec![Material::default()]);
     scene.lights = vec![
-        Light { position: DVec3::new(0.0, 0.0, 50.0), color: Vec3::ONE },
-        Light { position: DVec3::new(0.0, 0.0, -50.0), color: Vec3::ONE },
+        Light::constant(DVec3::new(0.0, 0.0, 50.0), Vec3::ONE),
+        Light::constant(DVec3::new(0.0, 0.0, -50.0), Vec3::ONE),
     ];
     for &kind in BackendKind::COMPILED {
         // From the side, below the roof: only the lower square's upper side is seen.

@@ -118,7 +118,8 @@ impl AnyBackend {
             #[cfg(not(feature = "embree"))]
             BackendKind::Embree => Err(Error::NotCompiledIn),
             BackendKind::Native => {
-                let meshes: Vec<_> = scene.objects.iter().map(|o| Arc::clone(&o.mesh)).collect();
+                let meshes: Vec<_> =
+                    scene.objects.iter().filter_map(|o| o.mesh()).map(|m| Arc::clone(&m.data.triangles)).collect();
                 let quality =
                     if options.prefers_quick_build(scene) { native::Quality::Fast } else { native::Quality::Good };
                 let build = native::BuildOptions { quality, cancel: options.cancel };

@@ -24,8 +24,8 @@ impl EmbreeBackend {
         let device = Device::new(&DeviceConfig { threads: options.threads, ..DeviceConfig::default() })?;
         let quality = if options.prefers_quick_build(scene) { Quality::Low } else { Quality::Medium };
         let mut builder = SceneBuilder::new(&device, SceneOptions { quality, ..SceneOptions::default() })?;
-        for object in &scene.objects {
-            builder.mesh(Arc::clone(&object.mesh))?;
+        for mesh in scene.objects.iter().filter_map(|o| o.mesh()) {
+            builder.mesh(Arc::clone(&mesh.data.triangles))?;
         }
         let progress = |share: f64| {
             if let Some(tell) = options.progress {

@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use tison::backend::BackendKind;
 use tison::film::{self, Format};
 use tison::render::{Crop, Job};
+use tison::scene::desc::LensSampler;
 use tison::scene::{CameraOverrides, Projection, View};
 
 /// A render, as it will be done.
@@ -187,6 +188,9 @@ fn job(args: &RenderArgs) -> Result<Job, Failure> {
         k_max: args.recursion,
         min_weight: args.min_weight,
         centre: args.centre,
+        lens_sampler: LensSampler::default(),
+        jitter_radius: 0.5,
+        light_samples: 1,
         aovs,
     })
 }

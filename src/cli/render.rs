@@ -214,7 +214,13 @@ impl Run<'_> {
 /// Reads a scene and shows how far it is.
 pub fn load(path: &Path, smooth: Option<f64>, control: &Control, progress: &Progress) -> Result<Loaded, scene::Error> {
     let report = |done: u64, total: u64| progress.report(done as f64 / total.max(1) as f64);
-    let options = LoadOptions { smooth, allow: Vec::new(), cancel: &control.cancel, progress: Some(&report) };
+    let options = LoadOptions {
+        smooth,
+        allow: Vec::new(),
+        overrides: Vec::new(),
+        cancel: &control.cancel,
+        progress: Some(&report),
+    };
     scene::load(path, &options)
 }
 

@@ -57,6 +57,8 @@ mod tests {
             projection: Projection::Perspective { fov_deg },
             aperture: 0.0,
             focus: None,
+            aspect: None,
+            clip: None,
         }
     }
 

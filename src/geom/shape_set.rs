@@ -34,6 +34,9 @@ pub trait ShapeSet: Send + Sync {
     where
         Self: Sized;
 
+    /// Bytes of the shapes.
+    fn bytes(&self) -> usize;
+
     /// The surface point of a hit that a backend reported with parameter `t`, anew in f64 for the
     /// same ray; see [`Shape::refine`].
     fn refine(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t: f64) -> ShapePoint;
@@ -81,6 +84,10 @@ impl<S: Shape> Plain<S> {
 impl<S: Shape> ShapeSet for Plain<S> {
     fn len(&self) -> u32 {
         self.shapes.len() as u32
+    }
+
+    fn bytes(&self) -> usize {
+        size_of_val(&self.shapes[..])
     }
 
     fn bounds(&self, prim: u32) -> Bounds {
@@ -168,6 +175,10 @@ impl<S: Shape> Placed<S> {
 impl<S: Shape> ShapeSet for Affine<S> {
     fn len(&self) -> u32 {
         self.placed.len() as u32
+    }
+
+    fn bytes(&self) -> usize {
+        size_of_val(&self.placed[..]) + size_of_val(&self.to_world[..])
     }
 
     fn bounds(&self, prim: u32) -> Bounds {

@@ -153,11 +153,11 @@ impl Facets {
         let mut faces = [[0; 3]; LANES];
         let mut normals = [None; LANES];
         for lane in 0..block.len {
-            let object = &scene.objects[self.geom[lane] as usize];
-            let prim = self.prim[lane];
-            faces[lane] = object.mesh.faces()[prim as usize];
-            block.material[lane] = object.material(prim) as u32;
-            normals[lane] = object.normals.as_ref().map(|n| n.of(object.mesh.faces(), prim as usize));
+            let mesh = scene.objects[self.geom[lane] as usize].mesh().expect("a triangle was hit");
+            let (data, prim) = (&*mesh.data, self.prim[lane]);
+            faces[lane] = data.triangles.faces()[prim as usize];
+            block.material[lane] = mesh.material(prim);
+            normals[lane] = data.normals.as_ref().map(|n| n.of(data.triangles.faces(), prim as usize));
         }
         let put = |to: &mut [F32; 3], lane: usize, v: Vec3| {
             to[0][lane] = v.x;
@@ -165,11 +165,11 @@ impl Facets {
             to[2][lane] = v.z;
         };
         for lane in 0..block.len {
-            let object = &scene.objects[self.geom[lane] as usize];
+            let mesh = scene.objects[self.geom[lane] as usize].mesh().expect("a triangle was hit");
             for (to, i) in self.corners.iter_mut().zip(faces[lane]) {
-                put(to, lane, object.mesh.point(i));
+                put(to, lane, mesh.data.triangles.point(i));
             }
-            let normals = normals[lane].and_then(|at| object.normals_at(at));
+            let normals = normals[lane].and_then(|at| mesh.data.normals_at(at));
             self.smooth[lane] = normals.is_some();
             for (to, n) in self.normals.iter_mut().zip(normals.unwrap_or_default()) {
                 put(to, lane, n);

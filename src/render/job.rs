@@ -1,6 +1,7 @@
 //! What is to be rendered, how a run is watched and stopped, and what it tells afterwards.
 
 use crate::film::{Aov, Film};
+use crate::scene::desc::LensSampler;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
 /// Pixels `x0 <= x < x1`, `y0 <= y < y1` of the whole image, counted from the top left.
@@ -30,6 +31,12 @@ pub struct Job {
     pub min_weight: f32,
     /// One sample a pixel goes through the exact centre, not through a point beside it.
     pub centre: bool,
+    /// How points of the lens are drawn.
+    pub lens_sampler: LensSampler,
+    /// Camera rays pass within this many pixels of their pixel's centre, across and down; 0.5 is the whole pixel.
+    pub jitter_radius: f64,
+    /// Shadow rays at each light that has a size, per hit; at least 1.
+    pub light_samples: u32,
     /// Auxiliary images to fill.
     pub aovs: Vec<Aov>,
 }

@@ -138,7 +138,7 @@ mod tests {
     }
 
     fn light(position: DVec3) -> Light {
-        Light { position, color: Vec3::new(1.0, 2.0, 3.0) }
+        Light::constant(position, Vec3::new(1.0, 2.0, 3.0))
     }
 
     #[test]

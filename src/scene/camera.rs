@@ -20,6 +20,10 @@ pub struct CameraDesc {
     pub aperture: f64,
     /// Distance from the eye to the plane in focus, along the view; the target's unless given.
     pub focus: Option<f64>,
+    /// Width over height of the view, where it is not the image's.
+    pub aspect: Option<f64>,
+    /// A hit nearer or farther than this, in world units along the ray, shows the background.
+    pub clip: Option<(f64, f64)>,
 }
 
 /// Kinds of projection.
@@ -199,6 +203,8 @@ mod tests {
             projection: Projection::Perspective { fov_deg: 90.0 },
             aperture: 0.0,
             focus: None,
+            aspect: None,
+            clip: None,
         }
     }
 

@@ -81,10 +81,6 @@ pub struct NamedCamera {
     pub name: String,
     /// The camera in world space.
     pub camera: CameraDesc,
-    /// Width over height of the view, where it is not the image's.
-    pub aspect: Option<f64>,
-    /// Distances along the ray outside of which a hit shows the background.
-    pub clip: Option<(f64, f64)>,
 }
 
 /// A light as written.

@@ -1,5 +1,6 @@
 //! What can be wrong with a scene or a file it names, said so that a user can act on it.
 
+use super::format::Diagnostic;
 use std::path::{Path, PathBuf};
 use std::{fmt, io};
 
@@ -76,9 +77,17 @@ pub enum Error {
         /// How many would do.
         limit: u64,
     },
+    /// A scene file with mistakes in it, in the order of their places.
+    #[error("{}", in_short(.0))]
+    Scene(Vec<Diagnostic>),
     /// The caller asked to stop.
     #[error("stopped on request")]
     Cancelled,
+}
+
+/// One line a mistake.
+fn in_short(list: &[Diagnostic]) -> String {
+    list.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
 }
 
 /// Something odd that did not stop the reading.

@@ -1,7 +1,8 @@
 //! A camera and lights for a mesh that brings none.
 
 use super::{CameraDesc, Light, Projection, Scene};
-use crate::geom::BAD_FACE;
+use crate::geom::{BAD_FACE, Bounds, ShapeSet};
+use crate::with_shapes;
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -92,6 +93,8 @@ impl Scene {
             projection: overrides.projection.unwrap_or(Projection::Perspective { fov_deg: FOV_DEG }),
             aperture: overrides.aperture.unwrap_or(0.0),
             focus: overrides.focus,
+            aspect: None,
+            clip: None,
         };
         match overrides.eye {
             Some(eye) => (desc.eye, desc.up) = (eye, up),
@@ -141,15 +144,26 @@ impl Scene {
 
     /// Extremes over the corners of every triangle that can be hit, in camera axes.
     fn reach(&self, axes: impl Fn(DVec3) -> DVec3 + Sync, k: DVec2) -> Reach {
-        let of_object = |o: &super::Object| {
-            o.mesh
-                .faces()
+        let of_mesh = |m: &super::Mesh, to_scene: &(dyn Fn(DVec3) -> DVec3 + Sync)| {
+            let mesh = &m.data.triangles;
+            mesh.faces()
                 .par_chunks(1 << 14)
                 .map(|faces| {
                     let corners = faces.iter().filter(|&&f| f != BAD_FACE).flatten();
-                    corners.fold(Reach::NONE, |r, &i| r.with(axes(o.mesh.point(i).as_dvec3()), k))
+                    corners.fold(Reach::NONE, |r, &i| r.with(axes(to_scene(mesh.point(i).as_dvec3())), k))
                 })
                 .reduce(|| Reach::NONE, Reach::union)
+        };
+        let of_box = |r: Reach, b: Bounds| {
+            let corner = |i: i32| DVec3::select(glam::BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), b.hi, b.lo);
+            (0..8).fold(r, |r, i| r.with(axes(corner(i)), k))
+        };
+        let of_object = |o: &super::Object| match o {
+            super::Object::Mesh(m) => of_mesh(m, &|p| p),
+            super::Object::Instance(i) => of_mesh(&i.mesh, &|p| i.to_scene.transform_point3(p)),
+            super::Object::Shapes(s) => {
+                with_shapes!(&s.set, set => (0..set.len()).map(|i| set.bounds(i)).fold(Reach::NONE, of_box))
+            }
         };
         self.objects.iter().map(of_object).fold(Reach::NONE, Reach::union)
     }
@@ -168,8 +182,8 @@ impl Scene {
             if inside { eye + direction * (0.05 * radius) } else { center + direction * (6.0 * radius) }
         };
         self.lights = vec![
-            Light { position: place(-0.6, 0.9, 0.8), color: Vec3::new(0.82, 0.80, 0.76) },
-            Light { position: place(0.9, 0.25, 0.7), color: Vec3::new(0.20, 0.22, 0.26) },
+            Light::constant(place(-0.6, 0.9, 0.8), Vec3::new(0.82, 0.80, 0.76)),
+            Light::constant(place(0.9, 0.25, 0.7), Vec3::new(0.20, 0.22, 0.26)),
         ];
         self.ambient = Vec3::new(0.10, 0.105, 0.115);
     }
@@ -202,28 +216,31 @@ mod tests {
     use super::*;
     use crate::geom::TriangleMesh;
     use crate::math::Frame;
-    use crate::scene::{Material, Object};
+    use crate::scene::{Material, Mesh, MeshData, MeshPaint, Object};
     use std::sync::Arc;
 
     /// A crooked tetrahedron, and a vertex far off that no face uses.
     fn scene() -> Scene {
         let points = vec![0.1, 0.0, 0.2, 1.0, 0.1, 0.0, 0.0, 0.5, 0.1, 0.3, 0.2, 0.9, 50.0, 50.0, 50.0];
         let faces = vec![[0, 1, 2], [0, 1, 3], [1, 2, 3], [0, 2, 3]];
-        let mesh = Arc::new(TriangleMesh::new(points, faces));
+        let triangles = Arc::new(TriangleMesh::new(points, faces));
+        let data = Arc::new(MeshData { triangles, normals: None, uvs: None, face_materials: None });
         Scene {
             frame: Frame { origin: DVec3::new(1000.0, -3.0, 7.0), exponent: 3 },
-            objects: vec![Object { mesh, normals: None, face_materials: None }],
+            objects: vec![Object::Mesh(Mesh { data, paint: MeshPaint::One(0), mirrored: false })],
             materials: vec![Material::default()],
             lights: vec![],
             ambient: Vec3::ZERO,
             background: Vec3::ZERO,
+            textures: vec![],
+            course_rules: false,
         }
     }
 
     /// Image coordinates in [0, 1] of every used vertex.
     fn seen(scene: &Scene, desc: &CameraDesc, size: (u32, u32)) -> Vec<DVec2> {
         let camera = desc.prepare(&scene.frame, size).expect("a good camera");
-        let corners = (0..4).map(|i| scene.objects[0].mesh.point(i).as_dvec3());
+        let corners = (0..4).map(|i| scene.objects[0].mesh().expect("a mesh").data.triangles.point(i).as_dvec3());
         corners
             .map(|p| {
                 let rel = if camera.parallel { p } else { (p - camera.eye) / (p - camera.eye).dot(camera.forward) };

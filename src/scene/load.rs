@@ -1,6 +1,8 @@
 //! From a file on disk to a frozen scene.
 
-use super::{Error, Material, Object, Scene, Warning, obj, smooth};
+use super::desc::{NamedCamera, RenderDesc};
+use super::format::{Diagnostic, Override};
+use super::{Error, Material, Mesh, MeshData, MeshPaint, Object, Scene, Warning, obj, smooth};
 use crate::geom::TriangleMesh;
 use glam::Vec3;
 use std::path::{Path, PathBuf};
@@ -14,6 +16,8 @@ pub struct LoadOptions<'a> {
     pub smooth: Option<f64>,
     /// Folders besides the file's own that it may name files in.
     pub allow: Vec<PathBuf>,
+    /// Keys of a scene file set from outside, in this order.
+    pub overrides: Vec<Override>,
     /// Set by another thread to give up.
     pub cancel: &'a AtomicBool,
     /// Told bytes read and bytes in all, from any thread.
@@ -31,8 +35,16 @@ impl std::fmt::Debug for LoadOptions<'_> {
 pub struct Loaded {
     /// The scene, without lights if the file has none.
     pub scene: Scene,
-    /// One per kind and file.
+    /// What a scene file says about the picture; nothing for a bare mesh.
+    pub render: RenderDesc,
+    /// The cameras of a scene file in its order, the first is the default; none for a bare mesh.
+    pub cameras: Vec<NamedCamera>,
+    /// What was odd about the scene file itself, with its places.
+    pub diagnostics: Vec<Diagnostic>,
+    /// What was odd about files that it names, one per kind and file.
     pub warnings: Vec<Warning>,
+    /// Seconds spent on reading textures.
+    pub texture_seconds: f64,
 }
 
 /// Colour seen where nothing is hit, for a mesh that says nothing about it.
@@ -70,13 +82,23 @@ pub fn load(path: &Path, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
             normals = Some(smooth::crease_normals(&mesh, angle));
         }
     }
+    let data = MeshData { triangles: mesh, normals, uvs: file.uvs, face_materials: file.face_materials };
     let scene = Scene {
         frame: file.frame,
-        objects: vec![Object { mesh, normals, face_materials: file.face_materials }],
+        objects: vec![Object::Mesh(Mesh { data: Arc::new(data), paint: MeshPaint::PerFace(0), mirrored: false })],
         materials: file.materials.iter().map(Material::from).collect(),
         lights: Vec::new(),
         ambient: Vec3::ZERO,
         background: BACKGROUND,
+        textures: Vec::new(),
+        course_rules: false,
     };
-    Ok(Loaded { scene, warnings })
+    Ok(Loaded {
+        scene,
+        render: RenderDesc::default(),
+        cameras: Vec::new(),
+        diagnostics: Vec::new(),
+        warnings,
+        texture_seconds: 0.0,
+    })
 }

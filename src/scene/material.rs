@@ -22,8 +22,25 @@ pub struct Material {
     pub reflect: Reflect,
     /// Weight of the refracted ray; under [`Reflect::Fresnel`] times `1 - F`.
     pub refract: Vec3,
-    /// Index of refraction against the outside.
+    /// Index of refraction of the inside.
     pub ior: f64,
+    /// What is absorbed on the way through the inside, per scene unit and channel (Beer-Lambert).
+    pub absorption: Vec3,
+    /// The image that its colours come from.
+    pub texture: Option<Textured>,
+}
+
+/// How an image colours a material: each of these times the texel is added to the material's own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Textured {
+    /// Index into [`Scene::textures`](super::Scene::textures).
+    pub image: u32,
+    /// Adds to `ambient`.
+    pub ambient: Vec3,
+    /// Adds to `diffuse`.
+    pub diffuse: Vec3,
+    /// Adds to `specular`.
+    pub specular: Vec3,
 }
 
 /// Weight of the mirrored ray.
@@ -50,6 +67,8 @@ impl Default for Material {
             reflect: Reflect::NONE,
             refract: Vec3::ZERO,
             ior: 1.0,
+            absorption: Vec3::ZERO,
+            texture: None,
         }
     }
 }
@@ -88,7 +107,8 @@ impl Material {
     /// Whether a light can change how it looks.
     #[must_use]
     pub fn is_lit(&self) -> bool {
-        self.diffuse != Vec3::ZERO || self.specular != Vec3::ZERO
+        let textured = self.texture.is_some_and(|t| t.diffuse != Vec3::ZERO || t.specular != Vec3::ZERO);
+        textured || self.diffuse != Vec3::ZERO || self.specular != Vec3::ZERO
     }
 
     /// Largest share of the light of its secondary rays that a hit passes on.
@@ -133,6 +153,8 @@ impl From<&MtlMaterial> for Material {
             },
             refract: Vec3::ZERO,
             ior: f64::from(m.ni.unwrap_or(if matches!(illum, 6 | 7) { 1.5 } else { 1.0 })),
+            absorption: Vec3::ZERO,
+            texture: None,
         };
         let tint = Vec3::from(m.tf.unwrap_or([1.0; 3]));
         match illum {

@@ -15,20 +15,25 @@ mod load;
 mod material;
 mod needs;
 pub mod obj;
+mod object;
 pub mod smooth;
+mod texture;
 
 pub use camera::{Camera, CameraDesc, CameraRays, Projection};
 pub use error::{Error, Warning};
 pub use framing::{CameraOverrides, View};
 pub use light::Light;
 pub use load::{LoadOptions, Loaded, load};
-pub use material::{Material, Reflect};
+pub use material::{Material, Reflect, Textured};
 pub use needs::Needs;
+pub use object::{AnyShapes, Instance, Mesh, MeshData, MeshPaint, Object, Shapes};
+pub use texture::Texture;
 
-use crate::geom::{Bounds, TriangleMesh};
+use crate::geom::{Bounds, ShapeSet};
 use crate::math::Frame;
+use crate::with_shapes;
 use glam::Vec3;
-use obj::CornerData;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Everything a render reads. Frozen: made by [`load`], then only lit and looked at.
@@ -40,23 +45,17 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// Materials by index, at least one.
     pub materials: Vec<Material>,
+    /// Images that materials sample, by index.
+    pub textures: Vec<Texture>,
     /// Lights, in scene space.
     pub lights: Vec<Light>,
     /// Ambient light, linear RGB.
     pub ambient: Vec3,
     /// What a ray sees that hits nothing, linear RGB.
     pub background: Vec3,
-}
-
-/// A mesh and what is known at its corners.
-#[derive(Debug)]
-pub struct Object {
-    /// The triangles, in scene space.
-    pub mesh: Arc<TriangleMesh>,
-    /// Normals at the corners; absent where the mesh is flat.
-    pub normals: Option<CornerData>,
-    /// Material of each triangle; absent where one serves all.
-    pub face_materials: Option<Vec<u32>>,
+    /// Whether it is shaded by the rules of the course scenes: highlights towards the camera's
+    /// position at every depth, one index of refraction at every surface, entering or leaving.
+    pub course_rules: bool,
 }
 
 /// How much of everything there is.
@@ -64,6 +63,8 @@ pub struct Object {
 #[expect(missing_docs, reason = "the things counted")]
 pub struct SceneCounts {
     pub objects: usize,
+    /// Objects that share a mesh with others.
+    pub instances: usize,
     pub vertices: usize,
     /// As written, the bad ones included.
     pub triangles: usize,
@@ -74,33 +75,17 @@ pub struct SceneCounts {
     pub spheres: usize,
     pub cubes: usize,
     pub cylinders: usize,
+    pub quads: usize,
     pub lights: usize,
     pub materials: usize,
-}
-
-impl Object {
-    /// The three normals with these numbers; `None` unless there are all three.
-    #[inline]
-    #[must_use]
-    pub fn normals_at(&self, numbers: [u32; 3]) -> Option<[Vec3; 3]> {
-        let normals = self.normals.as_ref()?;
-        let [a, b, c] = numbers.map(|i| normals.get::<3>(i).map(Vec3::from));
-        Some([a?, b?, c?])
-    }
-
-    /// Index of the material of triangle `prim`.
-    #[inline]
-    #[must_use]
-    pub fn material(&self, prim: u32) -> usize {
-        self.face_materials.as_ref().map_or(0, |m| m[prim as usize] as usize)
-    }
+    pub textures: usize,
 }
 
 impl Scene {
     /// Box around all that can be hit, in scene space.
     #[must_use]
     pub fn local_bounds(&self) -> Bounds {
-        self.objects.iter().map(|o| o.mesh.bounds()).fold(Bounds::EMPTY, Bounds::union)
+        self.objects.iter().map(Object::bounds).fold(Bounds::EMPTY, Bounds::union)
     }
 
     /// Box around all that can be hit, in the file's coordinates.
@@ -113,31 +98,64 @@ impl Scene {
         Bounds { lo: self.frame.to_world(local.lo), hi: self.frame.to_world(local.hi) }
     }
 
-    /// How much of everything there is.
+    /// How much of everything there is. A mesh counts as often as it is placed.
     #[must_use]
     pub fn counts(&self) -> SceneCounts {
-        let sum = |f: fn(&TriangleMesh) -> usize| self.objects.iter().map(|o| f(&o.mesh)).sum();
-        SceneCounts {
+        let mut c = SceneCounts {
             objects: self.objects.len(),
-            vertices: sum(TriangleMesh::vertex_count),
-            triangles: sum(TriangleMesh::face_count),
-            degenerate: sum(|m| m.faults().degenerate),
-            non_finite: sum(|m| m.faults().non_finite),
             lights: self.lights.len(),
             materials: self.materials.len(),
+            textures: self.textures.len(),
             ..SceneCounts::default()
+        };
+        for object in &self.objects {
+            if let Some(mesh) = object.mesh() {
+                let triangles = &mesh.data.triangles;
+                c.vertices += triangles.vertex_count();
+                c.triangles += triangles.face_count();
+                c.degenerate += triangles.faults().degenerate;
+                c.non_finite += triangles.faults().non_finite;
+            }
+            match object {
+                Object::Mesh(_) => {}
+                Object::Instance(_) => c.instances += 1,
+                Object::Shapes(shapes) => {
+                    let count = match shapes.set {
+                        AnyShapes::Spheres(_) | AnyShapes::PlacedSpheres(_) => &mut c.spheres,
+                        AnyShapes::Cubes(_) | AnyShapes::PlacedCubes(_) => &mut c.cubes,
+                        AnyShapes::Cylinders(_) => &mut c.cylinders,
+                        AnyShapes::Quads(_) => &mut c.quads,
+                    };
+                    *count += shapes.set.len() as usize;
+                }
+            }
         }
+        c
     }
 
-    /// Bytes of geometry, normals and material indices.
+    /// Triangles that are stored: those of a mesh that is placed many times count once.
+    #[must_use]
+    pub fn stored_triangles(&self) -> usize {
+        self.meshes().map(|m| m.triangles.face_count()).sum()
+    }
+
+    /// Bytes of geometry, normals, texture coordinates, material indices and textures.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        let of = |o: &Object| {
-            o.mesh.bytes()
-                + o.normals.as_ref().map_or(0, CornerData::bytes)
-                + o.face_materials.as_ref().map_or(0, |m| size_of_val(&m[..]))
+        let shapes = |o: &Object| match o {
+            Object::Shapes(s) => with_shapes!(&s.set, set => set.bytes()) + size_of_val(&s.materials[..]),
+            _ => 0,
         };
-        self.objects.iter().map(of).sum()
+        self.meshes().map(MeshData::bytes).sum::<usize>()
+            + self.objects.iter().map(shapes).sum::<usize>()
+            + self.textures.iter().map(Texture::bytes).sum::<usize>()
+    }
+
+    /// Every mesh once, however often it is placed.
+    fn meshes(&self) -> impl Iterator<Item = &MeshData> {
+        let distinct: HashMap<_, _> =
+            self.objects.iter().filter_map(Object::mesh).map(|m| (Arc::as_ptr(&m.data), &*m.data)).collect();
+        distinct.into_values()
     }
 
     /// What rendering it takes.

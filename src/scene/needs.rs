@@ -14,6 +14,12 @@ pub struct Needs {
     pub specular: bool,
     /// Some object has normals to interpolate.
     pub smooth_normals: bool,
+    /// Some reachable material samples an image.
+    pub textures: bool,
+    /// Some light has a size: it is sampled at many points.
+    pub area_lights: bool,
+    /// Some reachable material absorbs light on the way through.
+    pub absorption: bool,
     /// There are lights, and materials that they can change.
     pub shadow_rays: bool,
 }
@@ -27,8 +33,12 @@ impl Needs {
         Self {
             reflection: any(super::Material::reflects),
             refraction: any(super::Material::refracts),
-            specular: lights && any(|m| m.specular != Vec3::ZERO),
-            smooth_normals: scene.objects.iter().any(|o| o.normals.is_some()),
+            specular: lights
+                && any(|m| m.specular != Vec3::ZERO || m.texture.is_some_and(|t| t.specular != Vec3::ZERO)),
+            smooth_normals: scene.objects.iter().filter_map(super::Object::mesh).any(|m| m.data.normals.is_some()),
+            textures: any(|m| m.texture.is_some()),
+            area_lights: scene.lights.iter().any(|l| l.color != Vec3::ZERO && l.radius > 0.0),
+            absorption: any(|m| m.refracts() && m.absorption != Vec3::ZERO),
             shadow_rays: lights && any(super::Material::is_lit),
         }
     }
@@ -41,12 +51,15 @@ impl Needs {
 
     /// Each need by name.
     #[must_use]
-    pub fn list(&self) -> [(&'static str, bool); 5] {
+    pub fn list(&self) -> [(&'static str, bool); 8] {
         [
             ("reflection", self.reflection),
             ("refraction", self.refraction),
             ("specular", self.specular),
             ("smooth_normals", self.smooth_normals),
+            ("textures", self.textures),
+            ("area_lights", self.area_lights),
+            ("absorption", self.absorption),
             ("shadow_rays", self.shadow_rays),
         ]
     }

@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 use tison::backend::{AnyBackend, Backend, BackendKind, BuildOptions};
 use tison::geom::{Coherence, Hit, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
 use tison::render::{self, Control, Crop, Job};
+use tison::scene::desc::LensSampler;
 use tison::scene::{self, CameraOverrides, LoadOptions, Projection, Scene, View};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -23,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
     let model = args.model()?;
     let cancel = AtomicBool::new(false);
-    let options = LoadOptions { smooth: None, allow: vec![], cancel: &cancel, progress: None };
+    let options = LoadOptions { smooth: None, allow: vec![], overrides: vec![], cancel: &cancel, progress: None };
     let mut scene = scene::load(&model, &options)?.scene;
     let aspect = f64::from(args.size.0) / f64::from(args.size.1);
     let camera = scene.auto_camera(View::ThreeQuarter, &args.camera, aspect)?;
@@ -36,6 +37,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         k_max: 0,
         min_weight: 0.0,
         centre: false,
+        lens_sampler: LensSampler::Concentric,
+        jitter_radius: 0.5,
+        light_samples: 1,
         aovs: vec![],
     };
     let build = BuildOptions {
@@ -218,8 +222,8 @@ impl RawScene {
         unsafe { sys::rtcSetSceneFlags(raw, sys::RTCSceneFlags::RTC_SCENE_FLAG_ROBUST) };
         // SAFETY: the scene is live.
         unsafe { sys::rtcSetSceneBuildQuality(raw, quality) };
-        for object in &scene.objects {
-            Self::attach(device, raw, &object.mesh, quality);
+        for mesh in scene.objects.iter().filter_map(|o| o.mesh()) {
+            Self::attach(device, raw, &mesh.data.triangles, quality);
         }
         // SAFETY: the scene is live and nobody else has it.
         unsafe { sys::rtcCommitScene(raw) };

@@ -122,7 +122,16 @@ fn camera(ctx: &Context, entry: &Entry) -> Option<NamedCamera> {
     let clip = optional(t.opt("clip"), clip);
     t.finish();
     let (eye, target, up, lens) = (eye?, target?, up?, lens?);
-    let camera = CameraDesc { eye, target, up, projection: projection?, aperture: lens.radius, focus: lens.focus };
+    let camera = CameraDesc {
+        eye,
+        target,
+        up,
+        projection: projection?,
+        aperture: lens.radius,
+        focus: lens.focus,
+        aspect: aspect?,
+        clip: clip?,
+    };
     let [_, _, forward] = match camera.basis() {
         Ok(basis) => basis,
         Err(why) => return no_view(ctx, &camera, [eye_at, target_at, up_at], &why),
@@ -131,7 +140,7 @@ fn camera(ctx: &Context, entry: &Entry) -> Option<NamedCamera> {
         Some((on, at)) => Some(focus_on(ctx, &camera, forward, on, at)?),
         None => lens.focus,
     };
-    Some(NamedCamera { name: entry.key.clone(), camera: CameraDesc { focus, ..camera }, aspect: aspect?, clip: clip? })
+    Some(NamedCamera { name: entry.key.clone(), camera: CameraDesc { focus, ..camera } })
 }
 
 /// `None` for a mistake, `Some(None)` where there is no value.

@@ -75,7 +75,7 @@ impl Writer {
         }
     }
 
-    fn camera(&mut self, NamedCamera { name, camera, aspect, clip }: &NamedCamera) {
+    fn camera(&mut self, NamedCamera { name, camera }: &NamedCamera) {
         self.header("camera", name);
         match camera.projection {
             Projection::Perspective { fov_deg } => {
@@ -95,8 +95,8 @@ impl Writer {
             (radius, None) if radius > 0.0 => self.line(format_args!("lens = {{ radius = {radius:?} }}")),
             _ => {}
         }
-        self.opt("aspect", *aspect);
-        self.opt("clip", clip.map(|(near, far)| [near, far]));
+        self.opt("aspect", camera.aspect);
+        self.opt("clip", camera.clip.map(|(near, far)| [near, far]));
     }
 
     fn light(&mut self, l: &LightDesc) {

@@ -411,12 +411,20 @@ impl<'c> Builder<'c> {
         };
         let [eye, target, up] = [0, 3, 6].map(|i| DVec3::new(n[i], n[i + 1], n[i + 2]));
         let (aperture, focus) = self.lens.map_or((0.0, None), |(radius, distance)| (radius, Some(distance)));
-        let camera = CameraDesc { eye, target, up, projection: Projection::Perspective { fov_deg }, aperture, focus };
+        let camera = CameraDesc {
+            eye,
+            target,
+            up,
+            projection: Projection::Perspective { fov_deg },
+            aperture,
+            focus,
+            aspect: Some(aspect),
+            clip: Some((near, far)),
+        };
         if camera.basis().is_err() {
             self.error(at, "the camera has no view", "an eye and a target apart, and up across the view");
         }
-        let clip = Some((near, far));
-        self.desc.cameras.push(NamedCamera { name: "main".into(), camera, aspect: Some(aspect), clip });
+        self.desc.cameras.push(NamedCamera { name: "main".into(), camera });
     }
 }
 
@@ -471,7 +479,7 @@ mod tests {
     fn the_camera_is_taken_literally() {
         let desc = read("Perspective 30 1.33 3 20 LookAt 0 1.25 15 0 0 0 0 0.99 -0.12 DOF 4 10 dimension 640 480");
         let c = &desc.cameras[0];
-        assert_eq!((c.aspect, c.clip), (Some(1.33), Some((3.0, 20.0))));
+        assert_eq!((c.camera.aspect, c.camera.clip), (Some(1.33), Some((3.0, 20.0))));
         assert_eq!(c.camera.eye, DVec3::new(0.0, 1.25, 15.0));
         assert_eq!(c.camera.projection, Projection::Perspective { fov_deg: 30.0 });
         // Half of the 4 degrees on each side of the axis, 10 away.

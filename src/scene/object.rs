@@ -1,0 +1,207 @@
+//! What there is to hit: meshes, placed copies of meshes, and sets of analytic shapes.
+
+use super::obj::CornerData;
+use crate::geom::{Affine, Bounds, Cube, Cylinder, Plain, Quad, ShapeSet, Sphere, TriangleMesh};
+use glam::{DAffine3, DMat3, Vec2, Vec3};
+use std::sync::Arc;
+
+/// One geometry of every backend; its place in [`Scene::objects`](super::Scene::objects) is the `geom_id`.
+#[derive(Clone, Debug)]
+pub enum Object {
+    /// A mesh whose corners are in scene space.
+    Mesh(Mesh),
+    /// A mesh in a space of its own, placed by a transform. Copies share its buffers and its hierarchy.
+    Instance(Instance),
+    /// Analytic shapes of one class, in scene space.
+    Shapes(Shapes),
+}
+
+/// A mesh and what its surface is made of.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    /// Triangles and what is known at their corners.
+    pub data: Arc<MeshData>,
+    /// Where its materials are.
+    pub paint: MeshPaint,
+    /// Its placement mirrors space: the winding's outside is the inside.
+    pub mirrored: bool,
+}
+
+/// Triangles and what is known at their corners, shared by all that show them.
+#[derive(Debug)]
+pub struct MeshData {
+    /// The triangles.
+    pub triangles: Arc<TriangleMesh>,
+    /// Normals at the corners; absent where the mesh is flat.
+    pub normals: Option<CornerData>,
+    /// Texture coordinates at the corners; absent where nothing samples them.
+    pub uvs: Option<CornerData>,
+    /// Material of each triangle, counted within the mesh's file; absent where one serves all.
+    pub face_materials: Option<Vec<u32>>,
+}
+
+/// The materials of a mesh, as indices into [`Scene::materials`](super::Scene::materials).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MeshPaint {
+    /// One for every triangle.
+    One(u32),
+    /// Those of its own file, which begin here.
+    PerFace(u32),
+}
+
+/// A placed copy of a mesh.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// The mesh, in its own space.
+    pub mesh: Mesh,
+    /// From the mesh's space to scene space; can be undone.
+    pub to_scene: DAffine3,
+    /// What takes normals to scene space, up to their length.
+    pub normal_to_scene: DMat3,
+}
+
+/// Shapes of one class and their materials.
+#[derive(Clone, Debug)]
+pub struct Shapes {
+    /// The shapes.
+    pub set: AnyShapes,
+    /// Material of each shape.
+    pub materials: Vec<u32>,
+}
+
+/// A set of shapes of one class. The plain ones need no transform of their own.
+#[derive(Clone, Debug)]
+#[expect(missing_docs, reason = "the classes")]
+pub enum AnyShapes {
+    Spheres(Arc<Plain<Sphere>>),
+    Cubes(Arc<Plain<Cube>>),
+    PlacedSpheres(Arc<Affine<Sphere>>),
+    PlacedCubes(Arc<Affine<Cube>>),
+    Cylinders(Arc<Affine<Cylinder>>),
+    Quads(Arc<Affine<Quad>>),
+}
+
+/// Runs `$body` with `$set` bound to the [`Arc`] of whichever set it is.
+#[macro_export]
+#[doc(hidden)]
+macro_rules! with_shapes {
+    ($any:expr, $set:ident => $body:expr) => {
+        match $any {
+            $crate::scene::AnyShapes::Spheres($set) => $body,
+            $crate::scene::AnyShapes::Cubes($set) => $body,
+            $crate::scene::AnyShapes::PlacedSpheres($set) => $body,
+            $crate::scene::AnyShapes::PlacedCubes($set) => $body,
+            $crate::scene::AnyShapes::Cylinders($set) => $body,
+            $crate::scene::AnyShapes::Quads($set) => $body,
+        }
+    };
+}
+
+impl Object {
+    /// The mesh, placed or not.
+    #[inline]
+    #[must_use]
+    pub fn mesh(&self) -> Option<&Mesh> {
+        match self {
+            Self::Mesh(mesh) => Some(mesh),
+            Self::Instance(instance) => Some(&instance.mesh),
+            Self::Shapes(_) => None,
+        }
+    }
+
+    /// Index of the material of primitive `prim`.
+    #[inline]
+    #[must_use]
+    pub fn material(&self, prim: u32) -> u32 {
+        match self {
+            Self::Mesh(mesh) => mesh.material(prim),
+            Self::Instance(instance) => instance.mesh.material(prim),
+            Self::Shapes(shapes) => shapes.materials[prim as usize],
+        }
+    }
+
+    /// Box around all of it that can be hit, in scene space.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        match self {
+            Self::Mesh(mesh) => mesh.data.triangles.bounds(),
+            Self::Instance(instance) => instance.bounds(),
+            Self::Shapes(shapes) => {
+                with_shapes!(&shapes.set, set => {
+                    (0..set.len()).map(|i| set.bounds(i)).fold(Bounds::EMPTY, Bounds::union)
+                })
+            }
+        }
+    }
+}
+
+impl Mesh {
+    /// Index of the material of triangle `prim`.
+    #[inline]
+    #[must_use]
+    pub fn material(&self, prim: u32) -> u32 {
+        match self.paint {
+            MeshPaint::One(material) => material,
+            MeshPaint::PerFace(first) => first + self.data.face_materials.as_ref().map_or(0, |m| m[prim as usize]),
+        }
+    }
+}
+
+impl MeshData {
+    /// The three normals with these numbers; `None` unless there are all three.
+    #[inline]
+    #[must_use]
+    pub fn normals_at(&self, numbers: [u32; 3]) -> Option<[Vec3; 3]> {
+        let normals = self.normals.as_ref()?;
+        let [a, b, c] = numbers.map(|i| normals.get::<3>(i).map(Vec3::from));
+        Some([a?, b?, c?])
+    }
+
+    /// The texture coordinates at the corners of triangle `prim`; `None` unless there are all three.
+    #[inline]
+    #[must_use]
+    pub fn uvs_of(&self, prim: u32) -> Option<[Vec2; 3]> {
+        let uvs = self.uvs.as_ref()?;
+        let [a, b, c] = uvs.of(self.triangles.faces(), prim as usize).map(|i| uvs.get::<2>(i).map(Vec2::from));
+        Some([a?, b?, c?])
+    }
+
+    /// Bytes of all buffers.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.triangles.bytes()
+            + self.normals.as_ref().map_or(0, CornerData::bytes)
+            + self.uvs.as_ref().map_or(0, CornerData::bytes)
+            + self.face_materials.as_ref().map_or(0, |m| size_of_val(&m[..]))
+    }
+}
+
+impl Instance {
+    /// Box around the placed box of the mesh.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        let own = self.mesh.data.triangles.bounds();
+        if own.is_empty() {
+            return own;
+        }
+        let m = self.to_scene.matrix3;
+        let half = 0.5 * own.size();
+        let half = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z;
+        let center = self.to_scene.transform_point3(own.center());
+        Bounds { lo: center - half, hi: center + half }
+    }
+}
+
+impl AnyShapes {
+    /// Number of shapes.
+    #[must_use]
+    pub fn len(&self) -> u32 {
+        with_shapes!(self, set => set.len())
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
