@@ -126,7 +126,8 @@ impl Shape for Cube {
         some_lane(t)
     }
 
-    fn refine(&self, o: DVec3, d: DVec3, t_near: f64, t: f64) -> ShapePoint {
+    #[inline]
+    fn refine_for(&self, o: DVec3, d: DVec3, t_near: f64, t: f64, _: bool) -> ShapePoint {
         let own = self.hit(o, d, t_near, f64::INFINITY);
         let t = own.unwrap_or(t);
         let mut p = ((o - self.center) + t * d).clamp(-self.half, self.half);

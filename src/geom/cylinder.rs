@@ -171,7 +171,8 @@ impl Shape for Cylinder {
         some_lane(t)
     }
 
-    fn refine(&self, o: DVec3, d: DVec3, t_near: f64, t: f64) -> ShapePoint {
+    #[inline]
+    fn refine_for(&self, o: DVec3, d: DVec3, t_near: f64, t: f64, uv: bool) -> ShapePoint {
         let own = self.hit(o, d, t_near, f64::INFINITY);
         let t = own.unwrap_or(t);
         let p = o + t * d;
@@ -180,7 +181,7 @@ impl Shape for Cylinder {
         if part == 0 {
             let n = p.truncate().normalize_or(DVec2::X);
             let viewed = if n.dot(d.truncate()) > 0.0 { -n } else { n };
-            let turn = viewed.y.atan2(viewed.x) / TAU;
+            let turn = if uv { viewed.y.atan2(viewed.x) / TAU } else { 0.0 };
             let z = p.z.clamp(-self.half, self.half);
             let uv = DVec2::new(if turn < 0.0 { 1.0 + turn } else { turn }, 0.5 - 0.5 * (z / self.half));
             return ShapePoint { t, p: (self.radius * n).extend(z), ng: n.extend(0.0), uv, extent, part };

@@ -58,7 +58,8 @@ impl Shape for Quad {
         some_lane(t)
     }
 
-    fn refine(&self, o: DVec3, d: DVec3, t_near: f64, t: f64) -> ShapePoint {
+    #[inline]
+    fn refine_for(&self, o: DVec3, d: DVec3, t_near: f64, t: f64, _: bool) -> ShapePoint {
         let t = self.hit(o, d, t_near, f64::INFINITY).unwrap_or(t);
         let p = (o + t * d).truncate().clamp(-self.half, self.half);
         let q = p / self.half;

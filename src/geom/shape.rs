@@ -24,7 +24,13 @@ pub trait Shape: Copy + std::fmt::Debug + Send + Sync + 'static {
     /// `t` is what the backend reported. It decides only where this computation, asked about a
     /// slightly different ray, finds no hit: a reported hit stays one, and the answer is the
     /// point of the surface near `o + t*d`.
-    fn refine(&self, o: DVec3, d: DVec3, t_near: f64, t: f64) -> ShapePoint;
+    fn refine(&self, o: DVec3, d: DVec3, t_near: f64, t: f64) -> ShapePoint {
+        self.refine_for(o, d, t_near, t, true)
+    }
+
+    /// [`refine`](Self::refine) that may leave the texture coordinates out unless `uv` says that
+    /// they are wanted: on round shapes they cost more than all the rest.
+    fn refine_for(&self, o: DVec3, d: DVec3, t_near: f64, t: f64, uv: bool) -> ShapePoint;
 }
 
 /// A point of a shape's surface, in f64.

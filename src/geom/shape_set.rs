@@ -39,7 +39,12 @@ pub trait ShapeSet: Send + Sync {
 
     /// The surface point of a hit that a backend reported with parameter `t`, anew in f64 for the
     /// same ray; see [`Shape::refine`].
-    fn refine(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t: f64) -> ShapePoint;
+    fn refine(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t: f64) -> ShapePoint {
+        self.refine_for(prim, o, d, t_near, t, true)
+    }
+
+    /// [`refine`](Self::refine), with texture coordinates only if `uv` says so; see [`Shape::refine_for`].
+    fn refine_for(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t: f64, uv: bool) -> ShapePoint;
 }
 
 /// Number of a new primitive.
@@ -107,8 +112,9 @@ impl<S: Shape> ShapeSet for Plain<S> {
         simd::run(PlainKernel { shape: &self.shapes[prim as usize], rays })
     }
 
-    fn refine(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t: f64) -> ShapePoint {
-        self.shapes[prim as usize].refine(o, d, t_near, t)
+    #[inline]
+    fn refine_for(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t: f64, uv: bool) -> ShapePoint {
+        self.shapes[prim as usize].refine_for(o, d, t_near, t, uv)
     }
 }
 
@@ -200,11 +206,11 @@ impl<S: Shape> ShapeSet for Affine<S> {
         simd::run(AffineKernel { placed: &self.placed[prim as usize], rays })
     }
 
-    fn refine(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t: f64) -> ShapePoint {
+    fn refine_for(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t: f64, uv: bool) -> ShapePoint {
         let placed = &self.placed[prim as usize];
         let to_world = &self.to_world[prim as usize];
         let (o, d) = placed.local_ray(o, d);
-        let local = placed.shape.refine(o, d, t_near, t);
+        let local = placed.shape.refine_for(o, d, t_near, t, uv);
         let ng = normal_matrix(&to_world.matrix3) * local.ng;
         ShapePoint {
             p: to_world.matrix3 * local.p + to_world.translation,

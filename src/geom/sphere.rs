@@ -119,11 +119,13 @@ impl Shape for Sphere {
         some_lane(t)
     }
 
-    fn refine(&self, o: DVec3, d: DVec3, t_near: f64, t: f64) -> ShapePoint {
+    #[inline]
+    fn refine_for(&self, o: DVec3, d: DVec3, t_near: f64, t: f64, uv: bool) -> ShapePoint {
         let t = self.hit(o, d, t_near, f64::INFINITY).unwrap_or(t);
         let ng = ((o - self.center) + t * d).normalize_or(-d.normalize_or(DVec3::Z));
         let n = if d.dot(ng) > 0.0 { -ng } else { ng };
-        let uv = DVec2::new(0.5 + (-n.x).atan2(-n.z) / TAU, 0.5 - n.y.clamp(-1.0, 1.0).asin() / PI);
+        let map = || DVec2::new(0.5 + (-n.x).atan2(-n.z) / TAU, 0.5 - n.y.clamp(-1.0, 1.0).asin() / PI);
+        let uv = if uv { map() } else { DVec2::ZERO };
         ShapePoint { t, p: self.center + self.radius * ng, ng, uv, extent: self.radius, part: 0 }
     }
 }
