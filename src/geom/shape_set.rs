@@ -258,7 +258,7 @@ fn cofactors(m: &DMat3) -> DMat3 {
 
 /// What takes normals to world space: the cofactor matrix with the determinant's sign, which is the
 /// inverse transpose up to a positive factor, without a division.
-fn normal_matrix(m: &DMat3) -> DMat3 {
+pub(crate) fn normal_matrix(m: &DMat3) -> DMat3 {
     let m = *m * (1.0 / magnitude(m));
     let cof = cofactors(&m);
     let det = m.x_axis.dot(cof.x_axis);
@@ -266,7 +266,7 @@ fn normal_matrix(m: &DMat3) -> DMat3 {
 }
 
 /// Inverse of the linear part of `to_world`.
-fn invert(to_world: &DAffine3) -> Result<DMat3, ShapeError> {
+pub(crate) fn invert(to_world: &DAffine3) -> Result<DMat3, ShapeError> {
     /// Share of the box's volume that the rounding of the entries alone can make.
     const NOTHING: f64 = 4e-15;
     if !to_world.is_finite() {

@@ -17,9 +17,11 @@ pub struct SurfacePoint {
     pub to_eye: Vec3,
     /// Size of the primitive, for offsets.
     pub extent: f64,
+    /// Diffuse colour, linear RGB.
+    pub albedo: Vec3,
     /// Index of the material.
     pub material: usize,
-    /// Whether the ray met the side that the winding calls outer.
+    /// Whether the ray met the side that the surface calls outer.
     pub entering: bool,
 }
 
@@ -34,6 +36,7 @@ impl SurfacePoint {
             ns: Block::dvec3(&block.ns, lane),
             to_eye: Block::vec3(&block.to_eye, lane),
             extent: block.extent[lane],
+            albedo: Block::vec3(&block.diffuse, lane),
             material: block.material[lane] as usize,
             entering: block.entering[lane],
         }
