@@ -34,6 +34,9 @@ pub trait ShapeSet: Send + Sync {
     where
         Self: Sized;
 
+    /// Whether `p` lies inside of shape `prim`; see [`Shape::contains`].
+    fn contains(&self, prim: u32, p: DVec3) -> bool;
+
     /// Bytes of the shapes.
     fn bytes(&self) -> usize;
 
@@ -93,6 +96,10 @@ impl<S: Shape> ShapeSet for Plain<S> {
 
     fn bytes(&self) -> usize {
         size_of_val(&self.shapes[..])
+    }
+
+    fn contains(&self, prim: u32, p: DVec3) -> bool {
+        self.shapes[prim as usize].contains(p)
     }
 
     fn bounds(&self, prim: u32) -> Bounds {
@@ -181,6 +188,11 @@ impl<S: Shape> Placed<S> {
 impl<S: Shape> ShapeSet for Affine<S> {
     fn len(&self) -> u32 {
         self.placed.len() as u32
+    }
+
+    fn contains(&self, prim: u32, p: DVec3) -> bool {
+        let placed = &self.placed[prim as usize];
+        placed.shape.contains(placed.inverse * (p - placed.translation))
     }
 
     fn bytes(&self) -> usize {

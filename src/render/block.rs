@@ -58,6 +58,8 @@ pub struct Block {
     pub branch: [Branch; LANES],
     /// What the ray travelled in.
     pub medium: [Medium; LANES],
+    /// Object and primitive.
+    pub id: [[u32; 2]; LANES],
     /// Index of the material.
     pub material: [u32; LANES],
     /// Share of the colour that arrives in the sample.
@@ -95,6 +97,7 @@ impl Block {
         depth: [0; LANES],
         branch: [Branch::CAMERA; LANES],
         medium: [Medium::OUTSIDE; LANES],
+        id: [[0; 2]; LANES],
         material: [0; LANES],
         weight: [[0.0; LANES]; 3],
         diffuse: [[0.0; LANES]; 3],
@@ -154,6 +157,7 @@ impl Block {
         packet.ray.set(0, ray);
         packet.set_hit(0, Some(hit));
         block.set(0, path);
+        block.id[0] = [hit.geom_id, hit.prim_id];
         let palette = Palette::of(scene);
         match &scene.objects[hit.geom_id as usize] {
             Object::Shapes(_) => Self::finish_one(ShapeHits::default(), scene, &packet, &mut block, &palette),

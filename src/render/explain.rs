@@ -1,6 +1,7 @@
 //! One pixel told in words: every ray of its first sample and what became of it.
 
 use super::block::{Block, Path};
+use super::contacts::Contacts;
 use super::job::Job;
 use super::lights::{self, Lit, Target};
 use super::media::Media;
@@ -50,6 +51,7 @@ struct Told<'a> {
     segment: Segment<'a>,
     seen_from: Option<DVec3>,
     clip: Option<(f64, f64)>,
+    contacts: Contacts,
     media: Media,
     out: String,
 }
@@ -71,6 +73,7 @@ impl<B: Backend> Teller<'_, B> {
             segment,
             seen_from: self.scene.course_rules.then_some(camera.eye),
             clip: camera.clip,
+            contacts: Contacts::of(self.scene),
             media: Media::new(),
             out: String::new(),
         };
@@ -184,7 +187,7 @@ impl<B: Backend> Teller<'_, B> {
             return;
         }
         let d: DVec3 = -point.to_eye.as_dvec3().normalize();
-        let sent = shade::onward(self.scene, &mut told.media, point, path.medium, d);
+        let sent = shade::onward(self.scene, &told.contacts, &mut told.media, point, path.medium, d);
         // The stack gives back the last first: the mirrored branch is told first.
         let ways = [("refracted", sent.refracted, 1, sent.behind), ("reflected", sent.reflected, 0, path.medium)];
         for (what, branch, kind, medium) in ways {

@@ -1,6 +1,7 @@
 //! What a ray travels in: the solids that it has entered and not left again.
 
 use super::block::Path;
+use super::contacts::Crossed;
 use crate::scene::Material;
 use glam::Vec3;
 use std::collections::HashMap;
@@ -39,7 +40,7 @@ pub struct Crossing {
     pub eta: f64,
     /// What a ray that passes travels in.
     pub behind: Medium,
-    /// Another solid is around the boundary on both sides and hides it.
+    /// The same solid, or its like, is on both sides: there is nothing to see.
     pub hidden: bool,
 }
 
@@ -63,24 +64,37 @@ impl Media {
     }
 
     /// A ray in `medium` at the boundary of a solid of material `index`, whose outer side it met
-    /// if `entering`.
+    /// if `entering`; `also` tells what else begins and ends there.
     ///
     /// Leaving a solid that was never entered, as a camera inside does, counts as having been in it.
-    pub fn cross(&mut self, materials: &[Material], medium: Medium, index: u32, entering: bool) -> Crossing {
-        let ior = |top: Option<u32>| top.map_or(1.0, |m| materials[m as usize].ior);
-        let (before, behind) = if entering {
-            (self.top(medium), self.enter(medium, index))
-        } else {
-            match self.leave(medium, index) {
-                Some(behind) => (self.top(medium), behind),
-                None => (Some(index), medium),
+    pub fn cross(
+        &mut self,
+        materials: &[Material],
+        medium: Medium,
+        index: u32,
+        entering: bool,
+        also: Option<&Crossed>,
+    ) -> Crossing {
+        let (left, entered) = also.map_or((&[][..], &[][..]), |also| (&also.left, &also.entered));
+        let (mut before, mut behind) = (self.top(medium), medium);
+        if !entering {
+            match self.leave(behind, index) {
+                Some(outer) => behind = outer,
+                None => before = Some(index),
             }
-        };
+        }
+        for &material in left {
+            behind = self.leave(behind, material).unwrap_or(behind);
+        }
+        for &material in entered {
+            behind = self.enter(behind, material);
+        }
+        if entering {
+            behind = self.enter(behind, index);
+        }
         let after = self.top(behind);
-        // Leaving one solid inside of another that was entered later.
-        let hidden = !entering && before != Some(index) && before == after;
-        let eta = if before == after { 1.0 } else { ior(before) / ior(after) };
-        Crossing { eta, behind, hidden }
+        let ior = |top: Option<u32>| top.map_or(1.0, |m| materials[m as usize].ior);
+        Crossing { eta: ior(before) / ior(after), behind, hidden: before == after }
     }
 
     /// Material around a ray in `medium`; nothing outside.
@@ -157,42 +171,60 @@ mod tests {
     #[test]
     fn nested_solids_bend_by_what_is_on_both_sides() {
         let (mut media, materials) = (Media::new(), materials());
-        let glass = media.cross(&materials, Medium::OUTSIDE, 0, true);
+        let glass = media.cross(&materials, Medium::OUTSIDE, 0, true, None);
         assert_eq!(glass.eta, 1.0 / 1.5);
-        let water = media.cross(&materials, glass.behind, 1, true);
+        let water = media.cross(&materials, glass.behind, 1, true, None);
         assert_eq!(water.eta, 1.5 / 1.33);
-        let back = media.cross(&materials, water.behind, 1, false);
+        let back = media.cross(&materials, water.behind, 1, false, None);
         assert_eq!((back.eta, back.behind), (1.33 / 1.5, glass.behind));
-        let out = media.cross(&materials, back.behind, 0, false);
+        let out = media.cross(&materials, back.behind, 0, false, None);
         assert_eq!((out.eta, out.behind), (1.5, Medium::OUTSIDE));
     }
 
     #[test]
     fn where_solids_overlap_the_later_one_hides_the_end_of_the_earlier() {
         let (mut media, materials) = (Media::new(), materials());
-        let a = media.cross(&materials, Medium::OUTSIDE, 0, true);
-        let b = media.cross(&materials, a.behind, 1, true);
-        let a_ends = media.cross(&materials, b.behind, 0, false);
+        let a = media.cross(&materials, Medium::OUTSIDE, 0, true, None);
+        let b = media.cross(&materials, a.behind, 1, true, None);
+        let a_ends = media.cross(&materials, b.behind, 0, false, None);
         assert_eq!((a_ends.eta, a_ends.hidden), (1.0, true));
-        let b_ends = media.cross(&materials, a_ends.behind, 1, false);
+        let b_ends = media.cross(&materials, a_ends.behind, 1, false, None);
         assert_eq!((b_ends.eta, b_ends.behind, b_ends.hidden), (1.33, Medium::OUTSIDE, false));
     }
 
     #[test]
     fn a_camera_inside_has_been_in_it_all_the_time() {
         let (mut media, materials) = (Media::new(), materials());
-        let out = media.cross(&materials, Medium::OUTSIDE, 2, false);
+        let out = media.cross(&materials, Medium::OUTSIDE, 2, false, None);
         assert_eq!((out.eta, out.behind), (2.0, Medium::OUTSIDE));
     }
 
     #[test]
     fn solids_of_one_material_in_each_other_are_one() {
         let (mut media, materials) = (Media::new(), materials());
-        let outer = media.cross(&materials, Medium::OUTSIDE, 0, true);
-        let inner = media.cross(&materials, outer.behind, 0, true);
-        assert_eq!(inner.eta, 1.0);
-        let back = media.cross(&materials, inner.behind, 0, false);
-        assert_eq!((back.eta, back.behind), (1.0, outer.behind));
+        let outer = media.cross(&materials, Medium::OUTSIDE, 0, true, None);
+        let inner = media.cross(&materials, outer.behind, 0, true, None);
+        assert!(inner.hidden);
+        let back = media.cross(&materials, inner.behind, 0, false, None);
+        assert_eq!((back.hidden, back.behind), (true, outer.behind));
+    }
+
+    #[test]
+    fn touching_solids_are_left_and_entered_at_once() {
+        let (mut media, materials) = (Media::new(), materials());
+        let glass = media.cross(&materials, Medium::OUTSIDE, 0, true, None).behind;
+        // Either of the two boundaries may be the one that is reported.
+        let enters = Crossed { left: vec![], entered: vec![1] };
+        let leaves = Crossed { left: vec![0], entered: vec![] };
+        for (index, entering, also) in [(0, false, &enters), (1, true, &leaves)] {
+            let contact = media.cross(&materials, glass, index, entering, Some(also));
+            assert_eq!((contact.eta, contact.hidden), (1.5 / 1.33, false));
+            let out = media.cross(&materials, contact.behind, 1, false, None);
+            assert_eq!((out.eta, out.behind), (1.33, Medium::OUTSIDE));
+        }
+        let its_like = Crossed { left: vec![0], entered: vec![] };
+        let contact = media.cross(&materials, glass, 0, true, Some(&its_like));
+        assert_eq!((contact.eta, contact.hidden, contact.behind), (1.0, true, glass));
     }
 
     #[test]
@@ -200,7 +232,7 @@ mod tests {
         let (mut media, materials) = (Media::new(), materials());
         let mut medium = Medium::OUTSIDE;
         for i in 0..100_000 {
-            medium = media.cross(&materials, medium, i % 2, true).behind;
+            medium = media.cross(&materials, medium, i % 2, true, None).behind;
         }
         assert!(media.nestings.len() < 10 * DEEPEST as usize);
         assert_eq!(media.nesting(medium).depth, DEEPEST);

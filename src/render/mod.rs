@@ -2,6 +2,7 @@
 
 mod block;
 mod certificate;
+mod contacts;
 mod explain;
 mod facets;
 mod job;
@@ -23,6 +24,7 @@ use crate::film::{Aov, AovImage, Film};
 use crate::geom::{Coherence, LANES, PacketBatch, RayHitPacket};
 use crate::scene::{Camera, CameraDesc, Needs, Scene};
 use certificate::Radiance;
+use contacts::Contacts;
 use glam::{DVec3, Vec3};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
@@ -96,6 +98,7 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
         let crop = self.job.crop;
         let tiles = tile::tiles(crop);
         let radiance = Radiance::of(self.scene, &self.needs, self.job.k_max);
+        let contacts = if self.needs.refraction { Contacts::of(self.scene) } else { Contacts::default() };
         let sum = Mutex::new(Sum {
             film: Film::new(crop.x1 - crop.x0, crop.y1 - crop.y0, &self.job.aovs),
             tally: Tally::default(),
@@ -105,7 +108,7 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
         });
         let next = AtomicUsize::new(0);
         rayon::broadcast(|_| {
-            let mut worker = TileWorker::new(self, &radiance);
+            let mut worker = TileWorker::new(self, &radiance, &contacts);
             while !self.control.is_cancelled() {
                 let index = next.fetch_add(1, Relaxed);
                 let Some(&tile) = tiles.get(index) else { break };
@@ -178,8 +181,9 @@ struct FirstHits {
 }
 
 impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
-    fn new(render: &'a Render<'a, B, SECONDARY>, radiance: &'a Radiance) -> Self {
-        let waves = Waves::new(render.scene, &render.camera, render.backend, render.job, &render.needs, radiance);
+    fn new(render: &'a Render<'a, B, SECONDARY>, radiance: &'a Radiance, contacts: &'a Contacts) -> Self {
+        let waves =
+            Waves::new(render.scene, &render.camera, render.backend, render.job, &render.needs, radiance, contacts);
         Self {
             render,
             waves,

@@ -1,5 +1,6 @@
 //! The branches that go on from a hit.
 
+use super::contacts::Contacts;
 use super::media::{Media, Medium};
 use super::optics;
 use super::surface::SurfacePoint;
@@ -28,7 +29,14 @@ pub struct Onward {
 
 /// The branches of a hit; `d` is the unit direction of the ray, `medium` what it travelled in.
 #[must_use]
-pub fn onward(scene: &Scene, media: &mut Media, point: &SurfacePoint, medium: Medium, d: DVec3) -> Onward {
+pub fn onward(
+    scene: &Scene,
+    contacts: &Contacts,
+    media: &mut Media,
+    point: &SurfacePoint,
+    medium: Medium,
+    d: DVec3,
+) -> Onward {
     let material = &scene.materials[point.material];
     let dense = material.refracts() || material.reflect == Reflect::Fresnel;
     // What neither bends nor absorbs fills no space: a sheet with holes, say.
@@ -38,7 +46,9 @@ pub fn onward(scene: &Scene, media: &mut Media, point: &SurfacePoint, medium: Me
     } else if !(dense && fills) {
         (1.0, medium)
     } else {
-        let crossing = media.cross(&scene.materials, medium, point.material as u32, point.entering);
+        let (before, behind) = point.both_sides();
+        let also = contacts.crossed(scene, point.id, before, behind);
+        let crossing = media.cross(&scene.materials, medium, point.material as u32, point.entering, also.as_ref());
         if crossing.hidden {
             let refracted = Some(Branch { d, weight: Vec3::ONE });
             return Onward { reflected: None, refracted, behind: crossing.behind };
@@ -110,6 +120,7 @@ mod tests {
             to_eye: Vec3::Y,
             extent: 1.0,
             albedo: Vec3::ONE,
+            id: [0; 2],
             material: 0,
             entering,
         }

@@ -3,6 +3,7 @@
 
 use super::block::{Block, F32, Hits, Path};
 use super::certificate::{Bound, Radiance};
+use super::contacts::Contacts;
 use super::facets::Facets;
 use super::job::{Job, RayCounts};
 use super::lights::{self, Lit, Target};
@@ -67,6 +68,7 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
     backend: &'a B,
     job: &'a Job,
     radiance: &'a Radiance,
+    contacts: &'a Contacts,
     /// The lights that can change anything.
     lights: Vec<Light>,
     /// Where highlights are seen from at every depth; `None`: from where each ray came.
@@ -109,6 +111,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         job: &'a Job,
         needs: &Needs,
         radiance: &'a Radiance,
+        contacts: &'a Contacts,
     ) -> Self {
         let cost = job.aovs.contains(&Aov::Cost).then(Vec::new);
         let seen = job.aovs.iter().any(|&a| a != Aov::Cost).then(Vec::new);
@@ -119,6 +122,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             backend,
             job,
             radiance,
+            contacts,
             lights: lights.copied().collect(),
             seen_from: scene.course_rules.then_some(camera.eye),
             clip: camera.clip,
@@ -247,6 +251,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
                 }
                 hits.set(lane, packet, i);
                 self.blocks[self.used].set(lane, &path);
+                self.blocks[self.used].id[lane] = [geom, packet.hit.prim_id[i]];
                 lane += 1;
                 if lane == LANES {
                     hits.finish(lane, self.scene, &self.palette, &mut self.blocks[self.used]);
@@ -379,7 +384,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         }
         let point = SurfacePoint::of_lane(block, lane);
         let d = -point.to_eye.as_dvec3().normalize();
-        let sent = shade::onward(self.scene, &mut self.media, &point, path.medium, d);
+        let sent = shade::onward(self.scene, self.contacts, &mut self.media, &point, path.medium, d);
         if let Some(branch) = sent.reflected.and_then(|b| self.worth_sending(&path, &b)) {
             self.tally.rays.reflected += 1;
             self.send(branch, &path, &point, 0, path.medium);
