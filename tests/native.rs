@@ -11,11 +11,21 @@ use tison::backend::Backend;
 use tison::backend::native::{BuildError, BuildOptions, Native, Quality};
 use tison::geom::triangle::{self, ShearedRay};
 use tison::geom::{BAD_FACE, Coherence, Hit, PacketBatch, Ray, RayHitPacket, RayPacket, TriangleMesh};
+use tison::scene::{Mesh, MeshData, MeshPaint, Object};
 
 static NEVER: AtomicBool = AtomicBool::new(false);
 
 fn built(meshes: &[Arc<TriangleMesh>], quality: Quality) -> Native {
-    Native::build(meshes, &BuildOptions { quality, cancel: &NEVER }).expect("never cancelled")
+    Native::build(&objects(meshes), &BuildOptions { quality, cancel: &NEVER }).expect("never cancelled")
+}
+
+fn objects(meshes: &[Arc<TriangleMesh>]) -> Vec<Object> {
+    let mesh = |triangles: &Arc<TriangleMesh>| {
+        let triangles = Arc::clone(triangles);
+        let data = Arc::new(MeshData { triangles, normals: None, uvs: None, face_materials: None });
+        Object::Mesh(Mesh { data, paint: MeshPaint::One(0), mirrored: false })
+    };
+    meshes.iter().map(mesh).collect()
 }
 
 fn mesh(points: &[Vec3], faces: Vec<[u32; 3]>) -> Arc<TriangleMesh> {
@@ -522,10 +532,10 @@ fn batches_answer_like_single_rays() {
 #[test]
 fn a_build_can_be_cancelled() {
     let (points, faces) = ball(60, bumpy);
-    let meshes = [mesh(&points, faces)];
+    let objects = objects(&[mesh(&points, faces)]);
     let cancel = AtomicBool::new(true);
     for quality in [Quality::Good, Quality::Fast] {
-        let result = Native::build(&meshes, &BuildOptions { quality, cancel: &cancel });
+        let result = Native::build(&objects, &BuildOptions { quality, cancel: &cancel });
         assert_eq!(result.err(), Some(BuildError::Cancelled));
     }
 }

@@ -22,5 +22,5 @@ pub use packet::{Coherence, HitLanes, LANES, PacketBatch, RayHitPacket, RayPacke
 pub use quad::Quad;
 pub use ray::{Hit, INVALID_ID, Ray};
 pub use shape::{Lanes, Shape, ShapeError, ShapePoint};
-pub use shape_set::{Affine, Plain, ShapeSet};
+pub use shape_set::{Affine, Plain, ShapeSet, invert};
 pub use sphere::Sphere;

@@ -1,9 +1,13 @@
 //! A ray prepared once for boxes and triangles, four at a time.
+//!
+//! In the scene a ray is f32 and exact. In the space of a placed mesh it is f64: boxes and the
+//! filter see it rounded, with the rounding accounted for, the f64 test sees it as it is.
 
 use super::bvh::{Block, Node};
+use super::traverse::Space;
 use crate::geom::Ray;
 use crate::geom::triangle::ShearedRay;
-use glam::{Vec3, Vec4};
+use glam::{BVec3, DVec3, Vec3, Vec4};
 
 /// What box tests may be off by, as a factor: a difference, a reciprocal and a product are
 /// three roundings of 2^-24 at each end of the interval, 2^-20 is above both together.
@@ -16,7 +20,10 @@ pub(super) const SLACK: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 /// Its `t` counts in units of a power of two times the direction's length, so that no
 /// direction is too long or too short for f32.
 pub(super) struct BoxRay {
+    /// Origin, rounded so that no near side of a box is farther than it is.
     pub(super) o: [f32; 3],
+    /// Origin, rounded so that no far side is nearer. The same where f32 holds it.
+    pub(super) far_o: [f32; 3],
     pub(super) inv_d: [f32; 3],
     /// Per axis, which side of a box the ray meets first.
     pub(super) near: [u8; 3],
@@ -28,6 +35,7 @@ pub(super) struct BoxRay {
 /// A [`BoxRay`] for four boxes at once.
 pub(super) struct BoxRay4 {
     o: [Vec4; 3],
+    far_o: [Vec4; 3],
     inv_d: [Vec4; 3],
     near: [usize; 3],
     t_near: Vec4,
@@ -40,21 +48,43 @@ pub(super) struct TriangleRay {
     /// Origin in the order of the sheared axes.
     o: [f32; 3],
     shear: [f32; 2],
+    /// What the rounding of the origin moves sheared coordinates by, at most.
+    off: f32,
 }
 
 /// Prepares `ray`; `None` where it meets nothing because it has no direction, is not finite
 /// or ends before it begins.
 pub(super) fn prepare(ray: &Ray) -> Option<(BoxRay, TriangleRay)> {
     let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
-    let longest = d.abs().max_element();
-    if !(o.is_finite() && d.is_finite() && longest > 0.0 && ray.t_near < ray.t_far) {
-        return None;
-    }
-    // The power of two at or below the largest component: scaling by it is exact.
-    let unit = f64::from_bits(longest.to_bits() & (0x7ff << 52));
+    let unit = unit(o, d).filter(|_| ray.t_near < ray.t_far)?;
     let (t_near, t_far) = interval(ray);
-    let exact = ShearedRay::new(o, d, t_near, t_far);
-    Some((BoxRay::new(ray, (d * (1.0 / unit)).as_vec3(), unit), TriangleRay::new(ray, exact)))
+    let boxes = BoxRay::new([ray.o; 2], (d * (1.0 / unit)).as_vec3(), t_near, unit);
+    Some((boxes, TriangleRay::new(ray.o, ShearedRay::new(o, d, t_near, t_far), 0.0)))
+}
+
+/// The same for a ray in the space of a placed mesh and the `t` between two.
+pub(super) fn prepare_placed(o: DVec3, d: DVec3, t_near: f64, t_far: f64) -> Option<(BoxRay, TriangleRay)> {
+    let unit = unit(o, d)?;
+    // What is shorter cannot move a hit, and its reciprocal would not fit.
+    let scaled = d * (1.0 / unit);
+    let scaled = DVec3::select(scaled.abs().cmplt(DVec3::splat(f32::MIN_POSITIVE.into())), DVec3::ZERO, scaled);
+    let nearest = o.as_vec3();
+    let below = Vec3::select(nearest.as_dvec3().cmpgt(o), nearest.map(f32::next_down), nearest);
+    let above = Vec3::select(nearest.as_dvec3().cmplt(o), nearest.map(f32::next_up), nearest);
+    let backwards = BVec3::from_array(scaled.to_array().map(f64::is_sign_negative));
+    let origins = [Vec3::select(backwards, below, above), Vec3::select(backwards, above, below)];
+    let boxes = BoxRay::new(origins, scaled.as_vec3(), t_near, unit);
+    // Half an ulp of x or y and as much of z, sheared; twice that, as for the other bounds.
+    let off = nearest.abs().max_element() * (2.0 * f32::EPSILON);
+    Some((boxes, TriangleRay::new(nearest, ShearedRay::new(o, scaled * unit, t_near, t_far), off)))
+}
+
+/// The power of two at or below the largest component of `d`: scaling by it is exact. `None`
+/// where the ray is not finite or has no direction.
+fn unit(o: DVec3, d: DVec3) -> Option<f64> {
+    let longest = d.abs().max_element();
+    let usable = o.is_finite() && d.is_finite() && longest >= f64::MIN_POSITIVE;
+    usable.then(|| f64::from_bits(longest.to_bits() & (0x7ff << 52)))
 }
 
 /// All `t` that lie between `t_near` and `t_far` once they are rounded to f32.
@@ -67,19 +97,15 @@ fn interval(ray: &Ray) -> (f64, f64) {
 }
 
 impl BoxRay {
-    /// `d` is the ray's direction divided by `unit`.
-    fn new(ray: &Ray, d: Vec3, unit: f64) -> Self {
+    /// `origins` are for near sides and for far ones; `d` is the ray's direction divided by `unit`.
+    fn new(origins: [Vec3; 2], d: Vec3, t_near: f64, unit: f64) -> Self {
         // Infinite where the ray is parallel to the sides. A box side through the origin
         // then gives NaN, and lanes with NaN may turn out either way: boxes are wider than
         // what is in them, so an origin on a side is outside of that.
         let inv_d = d.recip().to_array();
-        Self {
-            o: ray.o.to_array(),
-            inv_d,
-            near: inv_d.map(|i| u8::from(i.is_sign_negative())),
-            t_near: ((f64::from(ray.t_near) * unit) as f32).next_down(),
-            unit,
-        }
+        let near = inv_d.map(|i| u8::from(i.is_sign_negative()));
+        let [o, far_o] = origins.map(|o| o.to_array());
+        Self { o, far_o, inv_d, near, t_near: ((t_near * unit) as f32).next_down(), unit }
     }
 
     /// Whether both meet the same sides of boxes first, run parallel to none, and count `t`
@@ -100,6 +126,7 @@ impl BoxRay {
     pub(super) fn splat(&self) -> BoxRay4 {
         BoxRay4 {
             o: self.o.map(Vec4::splat),
+            far_o: self.far_o.map(Vec4::splat),
             inv_d: self.inv_d.map(Vec4::splat),
             near: self.near.map(usize::from),
             t_near: Vec4::splat(self.t_near),
@@ -110,19 +137,20 @@ impl BoxRay {
 impl BoxRay4 {
     /// Bits of the children whose boxes the ray meets up to `cull`, and where it enters them.
     #[inline]
-    pub(super) fn enter(&self, node: &Node, cull: f32) -> (u32, [f32; 4]) {
-        let side = |axis: usize, side: usize| (node.bounds[axis][side & 1] - self.o[axis]) * self.inv_d[axis];
-        let [x, y, z] = self.near;
-        let enter = side(0, x).max(side(1, y)).max(side(2, z).max(self.t_near));
-        let leave = side(0, 1 - x).min(side(1, 1 - y)).min(side(2, 1 - z)) * SLACK;
+    pub(super) fn enter<S: Space>(&self, node: &Node, cull: f32) -> (u32, [f32; 4]) {
+        let at = |axis: usize, side: usize, o: &[Vec4; 3]| (node.bounds[axis][side & 1] - o[axis]) * self.inv_d[axis];
+        let near = |axis: usize| at(axis, self.near[axis], &self.o);
+        let far = |axis: usize| at(axis, 1 - self.near[axis], if S::PLACED { &self.far_o } else { &self.o });
+        let enter = near(0).max(near(1)).max(near(2).max(self.t_near));
+        let leave = far(0).min(far(1)).min(far(2)) * SLACK;
         let hit = enter.cmple(leave.min(Vec4::splat(cull)));
         (hit.bitmask(), enter.to_array())
     }
 }
 
 impl TriangleRay {
-    fn new(ray: &Ray, exact: ShearedRay) -> Self {
-        Self { exact, o: exact.axes().map(|axis| ray.o[axis]), shear: exact.shear().map(|s| s as f32) }
+    fn new(o: Vec3, exact: ShearedRay, off: f32) -> Self {
+        Self { exact, o: exact.axes().map(|axis| o[axis]), shear: exact.shear().map(|s| s as f32), off }
     }
 
     /// Bits of the lanes of `block` that the ray's line may meet: all that the f64 test
@@ -134,9 +162,9 @@ impl TriangleRay {
     /// difference not above s + z, three of a product not above z, one of the result), an
     /// edge function by less than 4 d s + 2 d^2 + 4e s^2 <= 5 d (s + d), to which the
     /// smallest normal float is added for products that vanish. Where a bound overflows
-    /// nothing is turned away.
+    /// nothing is turned away. An origin that was rounded adds to d.
     #[inline]
-    pub(super) fn candidates(&self, block: &Block) -> u32 {
+    pub(super) fn candidates<S: Space>(&self, block: &Block) -> u32 {
         let [x, y, z] = self.exact.axes();
         let project = |corner: &[Vec4; 3]| {
             let along = corner[z] - self.o[2];
@@ -152,6 +180,7 @@ impl TriangleRay {
         let w = bx * ay - by * ax;
         let s = a.max(b).max(c);
         let d = (s + az.max(bz).max(cz)) * (8.0 / (1 << 24) as f32);
+        let d = if S::PLACED { d + self.off } else { d };
         let bound = d * (s + d) * 6.0 + f32::MIN_POSITIVE;
         let least = u.min(v).min(w);
         let most = u.max(v).max(w);
@@ -162,6 +191,7 @@ impl TriangleRay {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::backend::native::world::World;
     use crate::geom::triangle;
     use proptest::prelude::*;
 
@@ -186,7 +216,7 @@ mod tests {
             let corners = t.map(|p| p * unit);
             block.set(2, corners, 7);
             if triangle::intersect(&triangles.exact, corners).is_some() {
-                prop_assert!(triangles.candidates(&block) & 0b100 != 0);
+                prop_assert!(triangles.candidates::<World>(&block) & 0b100 != 0);
             }
         }
     }
@@ -201,7 +231,7 @@ mod tests {
         for lane in 0..4 {
             let ray = Ray::new(Vec3::new(lane as f32 + 0.3, 0.3, 0.0), Vec3::Z);
             let (_, triangles) = prepare(&ray).expect("finite");
-            assert_eq!(triangles.candidates(&block), 1 << lane);
+            assert_eq!(triangles.candidates::<World>(&block), 1 << lane);
         }
     }
 
