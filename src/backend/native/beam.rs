@@ -5,7 +5,7 @@
 
 use super::bvh::{Node, WIDTH};
 use super::ray::{BoxRay, SLACK};
-use super::traverse::{Space, Walk};
+use super::traverse::Walk;
 use crate::geom::LANES;
 use core::array;
 use glam::Vec4;
@@ -18,8 +18,6 @@ const GROUPS: usize = LANES / WIDTH;
 
 pub(super) struct Beam {
     o: [[Vec4; GROUPS]; 3],
-    /// As in [`BoxRay`]; not read in the scene.
-    far_o: [[Vec4; GROUPS]; 3],
     inv_d: [[Vec4; GROUPS]; 3],
     t_near: [Vec4; GROUPS],
     cull: [Vec4; GROUPS],
@@ -38,7 +36,7 @@ pub(super) struct Beam {
 impl Beam {
     /// `None` unless most lanes hold a ray, and all of those meet the same sides of boxes
     /// first, run parallel to none, and count `t` alike.
-    pub(super) fn new<S: Space>(walks: &[Option<Walk>]) -> Option<Self> {
+    pub(super) fn new(walks: &[Option<Walk>]) -> Option<Self> {
         let first = &walks.iter().flatten().next()?.boxes;
         if walks.iter().flatten().count() < ENOUGH || !walks.iter().flatten().all(|w| w.boxes.is_like(first)) {
             return None;
@@ -47,7 +45,6 @@ impl Beam {
         let walk = |i: usize| walks.get(i).and_then(Option::as_ref);
         let rays: [&BoxRay; LANES] = array::from_fn(|i| walk(i).map_or(first, |w| &w.boxes));
         let o = array::from_fn(|axis| gather(&rays, |b| b.o[axis]));
-        let far_o = if S::PLACED { array::from_fn(|axis| gather(&rays, |b| b.far_o[axis])) } else { o };
         let inv_d = array::from_fn(|axis| gather(&rays, |b| b.inv_d[axis]));
         let t_near = gather(&rays, |b| b.t_near);
         let culls: [f32; LANES] = array::from_fn(|i| walk(i).map_or(f32::NEG_INFINITY, |w| w.cull));
@@ -56,12 +53,11 @@ impl Beam {
         let ends = |v: &[Vec4; GROUPS]| [least(v), most(v)].map(Vec4::splat);
         Some(Self {
             first_o: array::from_fn(|axis| ends(&o[axis])[1 - near[axis]]),
-            last_o: array::from_fn(|axis| ends(&far_o[axis])[near[axis]]),
+            last_o: array::from_fn(|axis| ends(&o[axis])[near[axis]]),
             inv_d_range: array::from_fn(|axis| ends(&inv_d[axis])),
             first_t: Vec4::splat(least(&t_near)),
             last_t: most(&cull),
             o,
-            far_o,
             inv_d,
             t_near,
             cull,
@@ -104,17 +100,15 @@ impl Beam {
 
     /// Bits of the rays that enter the box of one child.
     #[inline]
-    pub(super) fn enter<S: Space>(&self, node: &Node, lane: usize) -> u32 {
+    pub(super) fn enter(&self, node: &Node, lane: usize) -> u32 {
         let side = |axis: usize, side: usize| Vec4::splat(node.bounds[axis][side & 1][lane]);
         let near: [Vec4; 3] = array::from_fn(|axis| side(axis, self.near[axis]));
         let far: [Vec4; 3] = array::from_fn(|axis| side(axis, !self.near[axis]));
-        let far_o = if S::PLACED { &self.far_o } else { &self.o };
         let mut lanes = 0;
         for g in 0..GROUPS {
-            let near = |axis: usize| (near[axis] - self.o[axis][g]) * self.inv_d[axis][g];
-            let far = |axis: usize| (far[axis] - far_o[axis][g]) * self.inv_d[axis][g];
-            let enter = near(0).max(near(1)).max(near(2).max(self.t_near[g]));
-            let leave = far(0).min(far(1)).min(far(2)) * SLACK;
+            let at = |axis: usize, side: Vec4| (side - self.o[axis][g]) * self.inv_d[axis][g];
+            let enter = at(0, near[0]).max(at(1, near[1])).max(at(2, near[2]).max(self.t_near[g]));
+            let leave = at(0, far[0]).min(at(1, far[1])).min(at(2, far[2])) * SLACK;
             lanes |= enter.cmple(leave.min(self.cull[g])).bitmask() << (g * WIDTH);
         }
         lanes

@@ -32,15 +32,11 @@ impl Item {
         Self { lo_id: a.min(b).min(c).extend(f32::from_bits(id)), hi: a.max(b).max(c).extend(SHARES) }
     }
 
-    /// Something with a leaf to itself.
-    ///
-    /// Its box is 2^-20 of the longest edge and an ulp wider than `bounds`: what decides a hit
-    /// may be off by a millionth of the size. Beyond 1e37 nothing is sure to be hit.
+    /// Something with a leaf to itself. Beyond 1e37 nothing is sure to be hit.
     pub(super) fn apart(bounds: &Bounds, id: u32) -> Self {
-        let pad = bounds.size().max_element() * (1.0 / f64::from(1 << 20));
         // `max` and `min` pass over a NaN: a side that is none is far away.
-        let lo = (bounds.lo - pad).map(|x| x.max(-FARTHEST).min(FARTHEST)).as_vec3();
-        let hi = (bounds.hi + pad).map(|x| x.min(FARTHEST).max(-FARTHEST)).as_vec3();
+        let lo = bounds.lo.map(|x| x.max(-FARTHEST).min(FARTHEST)).as_vec3();
+        let hi = bounds.hi.map(|x| x.min(FARTHEST).max(-FARTHEST)).as_vec3();
         Self { lo_id: lo.map(f32::next_down).extend(f32::from_bits(id)), hi: hi.map(f32::next_up).extend(APART) }
     }
 
@@ -122,15 +118,19 @@ impl Box4 {
         1.0 / e.x.max(e.y).max(e.z).max(f32::MIN_POSITIVE)
     }
 
-    /// The box a ray is tested against: wider by 2^-24 of its largest edge and one ulp.
+    /// The box a ray is tested against: wider by 2^-24 of its largest edge and two ulps.
     ///
     /// A ray that the f64 test lets hit may pass a triangle by 2^-50 of its size, and one
-    /// that runs in a side of the box must be inside, so that `0 * inf` cannot decide.
+    /// that runs in a side of the box must be inside, so that `0 * inf` cannot decide. The
+    /// second ulp is for origins that were rounded.
     pub(super) fn padded(&self) -> Self {
         let e = self.size();
         let pad = Vec4::splat(e.x.max(e.y).max(e.z) * (0.5 * f32::EPSILON));
         let out = |v: Vec4, f: fn(f32) -> f32| Vec4::new(f(v.x), f(v.y), f(v.z), 0.0);
-        Self { lo: out(self.lo - pad, f32::next_down), hi: out(self.hi + pad, f32::next_up) }
+        Self {
+            lo: out(self.lo - pad, |x| x.next_down().next_down()),
+            hi: out(self.hi + pad, |x| x.next_up().next_up()),
+        }
     }
 }
 

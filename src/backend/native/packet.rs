@@ -87,7 +87,7 @@ impl Level {
         single: &mut [Waiting],
         tools: &mut S::Tools,
     ) {
-        let beam = if coherence == Coherence::Coherent { Beam::new::<S>(&self.walks) } else { None };
+        let beam = if coherence == Coherence::Coherent { Beam::new(&self.walks) } else { None };
         if let Some(beam) = beam {
             self.together::<ANY, S>(space, beam, single, tools);
         } else {
@@ -111,7 +111,7 @@ impl Level {
                 continue;
             }
             let (node, lane) = (&space.bvh().nodes[node as usize], usize::from(lane));
-            let lanes = beam.enter::<S>(node, lane);
+            let lanes = beam.enter(node, lane);
             let (child, few) = (node.child[lane], lanes.count_ones() <= FEW);
             if !child.is_leaf() && !few {
                 self.enter(space, &beam, child);

@@ -1,16 +1,20 @@
 //! A ray prepared once for boxes and triangles, four at a time.
 //!
 //! In the scene a ray is f32 and exact. In the space of a placed mesh it is f64: boxes and the
-//! filter see it rounded, with the rounding accounted for, the f64 test sees it as it is.
+//! filter see it rounded, which their bounds account for, the f64 test sees it as it is.
 
 use super::bvh::{Block, Node};
 use super::traverse::Space;
 use crate::geom::Ray;
 use crate::geom::triangle::ShearedRay;
-use glam::{BVec3, DVec3, Vec3, Vec4};
+use glam::{DVec3, Vec3, Vec4};
 
 /// What box tests may be off by, as a factor: a difference, a reciprocal and a product are
 /// three roundings of 2^-24 at each end of the interval, 2^-20 is above both together.
+///
+/// In the space of a placed mesh the direction is rounded as well, and the origin o. Unless
+/// |o| > 2 |side|, half an ulp of o is at most one of the side, by which boxes are wider than they
+/// need be; else it is at most 2^-23 of the difference, and both ends together still stay below.
 ///
 /// Source: T. Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013.
 pub(super) const SLACK: f32 = 1.0 + 1.0 / (1 << 20) as f32;
@@ -20,10 +24,7 @@ pub(super) const SLACK: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 /// Its `t` counts in units of a power of two times the direction's length, so that no
 /// direction is too long or too short for f32.
 pub(super) struct BoxRay {
-    /// Origin, rounded so that no near side of a box is farther than it is.
     pub(super) o: [f32; 3],
-    /// Origin, rounded so that no far side is nearer. The same where f32 holds it.
-    pub(super) far_o: [f32; 3],
     pub(super) inv_d: [f32; 3],
     /// Per axis, which side of a box the ray meets first.
     pub(super) near: [u8; 3],
@@ -35,7 +36,6 @@ pub(super) struct BoxRay {
 /// A [`BoxRay`] for four boxes at once.
 pub(super) struct BoxRay4 {
     o: [Vec4; 3],
-    far_o: [Vec4; 3],
     inv_d: [Vec4; 3],
     near: [usize; 3],
     t_near: Vec4,
@@ -58,25 +58,25 @@ pub(super) fn prepare(ray: &Ray) -> Option<(BoxRay, TriangleRay)> {
     let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
     let unit = unit(o, d).filter(|_| ray.t_near < ray.t_far)?;
     let (t_near, t_far) = interval(ray);
-    let boxes = BoxRay::new([ray.o; 2], (d * (1.0 / unit)).as_vec3(), t_near, unit);
+    let boxes = BoxRay::new(ray.o, (d * (1.0 / unit)).as_vec3(), t_near, unit);
     Some((boxes, TriangleRay::new(ray.o, ShearedRay::new(o, d, t_near, t_far), 0.0)))
 }
 
-/// The same for a ray in the space of a placed mesh and the `t` between two.
+/// The same for a ray in the space of a placed mesh and the `t` between two; `None` as well for one
+/// that starts beyond f32, where the mesh is a speck.
 pub(super) fn prepare_placed(o: DVec3, d: DVec3, t_near: f64, t_far: f64) -> Option<(BoxRay, TriangleRay)> {
     let unit = unit(o, d)?;
     // What is shorter cannot move a hit, and its reciprocal would not fit.
     let scaled = d * (1.0 / unit);
     let scaled = DVec3::select(scaled.abs().cmplt(DVec3::splat(f32::MIN_POSITIVE.into())), DVec3::ZERO, scaled);
-    let nearest = o.as_vec3();
-    let below = Vec3::select(nearest.as_dvec3().cmpgt(o), nearest.map(f32::next_down), nearest);
-    let above = Vec3::select(nearest.as_dvec3().cmplt(o), nearest.map(f32::next_up), nearest);
-    let backwards = BVec3::from_array(scaled.to_array().map(f64::is_sign_negative));
-    let origins = [Vec3::select(backwards, below, above), Vec3::select(backwards, above, below)];
-    let boxes = BoxRay::new(origins, scaled.as_vec3(), t_near, unit);
+    let near = o.as_vec3();
+    if !near.is_finite() {
+        return None;
+    }
+    let boxes = BoxRay::new(near, scaled.as_vec3(), t_near, unit);
     // Half an ulp of x or y and as much of z, sheared; twice that, as for the other bounds.
-    let off = nearest.abs().max_element() * (2.0 * f32::EPSILON);
-    Some((boxes, TriangleRay::new(nearest, ShearedRay::new(o, scaled * unit, t_near, t_far), off)))
+    let off = near.abs().max_element() * (2.0 * f32::EPSILON);
+    Some((boxes, TriangleRay::new(near, ShearedRay::new(o, scaled * unit, t_near, t_far), off)))
 }
 
 /// The power of two at or below the largest component of `d`: scaling by it is exact. `None`
@@ -97,15 +97,14 @@ fn interval(ray: &Ray) -> (f64, f64) {
 }
 
 impl BoxRay {
-    /// `origins` are for near sides and for far ones; `d` is the ray's direction divided by `unit`.
-    fn new(origins: [Vec3; 2], d: Vec3, t_near: f64, unit: f64) -> Self {
+    /// `d` is the ray's direction divided by `unit`.
+    fn new(o: Vec3, d: Vec3, t_near: f64, unit: f64) -> Self {
         // Infinite where the ray is parallel to the sides. A box side through the origin
         // then gives NaN, and lanes with NaN may turn out either way: boxes are wider than
         // what is in them, so an origin on a side is outside of that.
         let inv_d = d.recip().to_array();
         let near = inv_d.map(|i| u8::from(i.is_sign_negative()));
-        let [o, far_o] = origins.map(|o| o.to_array());
-        Self { o, far_o, inv_d, near, t_near: ((t_near * unit) as f32).next_down(), unit }
+        Self { o: o.to_array(), inv_d, near, t_near: ((t_near * unit) as f32).next_down(), unit }
     }
 
     /// Whether both meet the same sides of boxes first, run parallel to none, and count `t`
@@ -126,7 +125,6 @@ impl BoxRay {
     pub(super) fn splat(&self) -> BoxRay4 {
         BoxRay4 {
             o: self.o.map(Vec4::splat),
-            far_o: self.far_o.map(Vec4::splat),
             inv_d: self.inv_d.map(Vec4::splat),
             near: self.near.map(usize::from),
             t_near: Vec4::splat(self.t_near),
@@ -137,12 +135,11 @@ impl BoxRay {
 impl BoxRay4 {
     /// Bits of the children whose boxes the ray meets up to `cull`, and where it enters them.
     #[inline]
-    pub(super) fn enter<S: Space>(&self, node: &Node, cull: f32) -> (u32, [f32; 4]) {
-        let at = |axis: usize, side: usize, o: &[Vec4; 3]| (node.bounds[axis][side & 1] - o[axis]) * self.inv_d[axis];
-        let near = |axis: usize| at(axis, self.near[axis], &self.o);
-        let far = |axis: usize| at(axis, 1 - self.near[axis], if S::PLACED { &self.far_o } else { &self.o });
-        let enter = near(0).max(near(1)).max(near(2).max(self.t_near));
-        let leave = far(0).min(far(1)).min(far(2)) * SLACK;
+    pub(super) fn enter(&self, node: &Node, cull: f32) -> (u32, [f32; 4]) {
+        let side = |axis: usize, side: usize| (node.bounds[axis][side & 1] - self.o[axis]) * self.inv_d[axis];
+        let [x, y, z] = self.near;
+        let enter = side(0, x).max(side(1, y)).max(side(2, z).max(self.t_near));
+        let leave = side(0, 1 - x).min(side(1, 1 - y)).min(side(2, 1 - z)) * SLACK;
         let hit = enter.cmple(leave.min(Vec4::splat(cull)));
         (hit.bitmask(), enter.to_array())
     }

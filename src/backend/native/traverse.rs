@@ -17,7 +17,7 @@ pub(super) const SMALL_STACK: usize = 63;
 
 /// Where rays are traced: in the scene, or in the space of a placed mesh.
 pub(super) trait Space {
-    /// Whether rays come from another space, so that f32 does not hold their origins.
+    /// Whether rays come from another space, so that their origins are rounded to f32.
     const PLACED: bool;
 
     /// What packets need to test things that have leaves to themselves.
@@ -217,7 +217,7 @@ fn nearest_child<S: Space>(
     waiting: &mut usize,
 ) -> Option<Child> {
     let node = &space.bvh().nodes[node.node_index()];
-    let (mut lanes, enter) = boxes.enter::<S>(node, cull);
+    let (mut lanes, enter) = boxes.enter(node, cull);
     if lanes == 0 {
         return None;
     }
