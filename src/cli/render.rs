@@ -196,11 +196,11 @@ impl Run<'_> {
             match target {
                 Target::File(path) => {
                     let path = self.plan.turntable.map_or_else(|| path.clone(), |_| turntable::frame_path(path, frame));
-                    written.extend(film::save_all(film, &path, *format, &notes)?);
+                    written.extend(film::save_all(film, &path, *format, &film::Display::default(), &notes)?);
                 }
                 Target::Stdout => {
                     let mut bytes = Cursor::new(Vec::new());
-                    film::encode(film, *format, &notes, &mut bytes)
+                    film::encode(film, *format, &film::Display::default(), &notes, &mut bytes)
                         .map_err(|e| Failure::new(Exit::Output, "cannot make the image for stdout").because(e))?;
                     output::print(bytes.get_ref())?;
                     written.push(("stdout".into(), bytes.get_ref().len() as u64));
