@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use tison::film::SaveError;
 use tison::scene;
+use tison::scene::format::Diagnostic;
 
 /// Exit codes. Scripts rely on them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +48,8 @@ pub struct Failure {
     pub help: Option<String>,
     /// The place in a file: path, line and column from 1.
     pub place: Option<(PathBuf, u64, u64)>,
+    /// Mistakes in a scene file, said instead of `what`.
+    pub diagnostics: Vec<Diagnostic>,
     /// The error behind it, which may have others behind it.
     pub cause: Option<Box<dyn Error + Send + Sync>>,
 }
@@ -54,7 +57,7 @@ pub struct Failure {
 impl Failure {
     /// A failure that says `what`.
     pub fn new(exit: Exit, what: impl Into<String>) -> Self {
-        Self { exit, what: what.into(), help: None, place: None, cause: None }
+        Self { exit, what: what.into(), help: None, place: None, diagnostics: Vec::new(), cause: None }
     }
 
     /// Wrong usage.
@@ -94,6 +97,7 @@ impl From<scene::Error> for Failure {
             scene::Error::Read { path, source } => {
                 Self { help: super::message::nearest_input(&path), ..failure.because(source) }
             }
+            scene::Error::Scene(diagnostics) => Self { diagnostics, ..failure },
             scene::Error::At { path, line, column, .. } => Self { place: Some((path, line, column)), ..failure },
             _ => failure,
         }

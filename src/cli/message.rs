@@ -2,8 +2,9 @@
 
 use super::VERSION;
 use super::args::Cli;
-use super::exit::Failure;
-use super::style::Style;
+use super::exit::{Exit, Failure};
+use super::notice::Notice;
+use super::style::{Style, counted};
 use clap::CommandFactory;
 use std::error::Error;
 use std::fs::File;
@@ -30,16 +31,34 @@ impl Messages {
         let _ = writeln!(io::stderr().lock(), "{text}");
     }
 
+    /// The first few notices as warnings, or all; `more` says how to see the others.
+    pub fn warnings(&self, notices: &[Notice], all: bool, more: &str) {
+        let (shown, hidden) = notices.split_at(if all { notices.len() } else { notices.len().min(FEW) });
+        shown.iter().for_each(|n| self.line(&n.told(false, self.style)));
+        if !hidden.is_empty() {
+            self.warning(&format!("and {} more ({more})", hidden.len()));
+        }
+    }
+
+    /// All notices, as the errors that `--strict` makes of them.
+    pub fn strict(&self, notices: &[Notice]) -> Result<(), Failure> {
+        notices.iter().for_each(|n| self.line(&n.told(true, self.style)));
+        match notices.len() as u64 {
+            0 => Ok(()),
+            n => {
+                let what = format!(
+                    "{}, which --strict takes for {}",
+                    counted(n, "warning"),
+                    if n == 1 { "an error" } else { "errors" }
+                );
+                Err(Failure::new(Exit::Input, what))
+            }
+        }
+    }
+
     /// One warning.
     pub fn warning(&self, text: &str) {
         self.line(&format!("{} {text}", self.style.warning("warning:")));
-    }
-
-    /// The first few warnings, or all; `more` says how to see the others.
-    pub fn warnings(&self, texts: &[impl ToString], all: bool, more: &str) {
-        for text in chosen(texts, all, more) {
-            self.warning(&text);
-        }
     }
 
     /// Why the run did not end well.
@@ -48,16 +67,11 @@ impl Messages {
     }
 }
 
-fn chosen(texts: &[impl ToString], all: bool, more: &str) -> Vec<String> {
-    let shown = if all { texts.len() } else { texts.len().min(FEW) };
-    let mut chosen: Vec<String> = texts[..shown].iter().map(ToString::to_string).collect();
-    if shown < texts.len() {
-        chosen.push(format!("and {} more ({more})", texts.len() - shown));
-    }
-    chosen
-}
-
 fn describe(failure: &Failure, style: Style) -> String {
+    if !failure.diagnostics.is_empty() {
+        let shown: Vec<String> = failure.diagnostics.iter().map(|d| d.render(style.look())).collect();
+        return shown.join("\n\n");
+    }
     let mut out = format!("{} {}", style.error("error:"), failure.what);
     let excerpt = failure.place.as_ref().and_then(|(path, line, column)| {
         let text = source_line(path, *line)?;
@@ -181,7 +195,6 @@ fn edits(a: &str, b: &str) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::exit::Exit;
     use super::*;
 
     #[test]
@@ -192,14 +205,6 @@ mod tests {
         assert_eq!(nearest("elephant", views), None);
         assert_eq!(edits("kitten", "sitting"), 3);
         assert_eq!(edits("", "abc"), 3);
-    }
-
-    #[test]
-    fn only_some_of_many_warnings_unless_asked_for() {
-        let many = ["a", "b", "c", "d", "e", "f", "g"];
-        assert_eq!(chosen(&many, true, "").len(), 7);
-        assert_eq!(chosen(&many[..5], false, "-v shows all"), ["a", "b", "c", "d", "e"]);
-        assert_eq!(chosen(&many, false, "-v shows all")[4..], ["e", "and 2 more (-v shows all)"]);
     }
 
     #[test]

@@ -119,6 +119,7 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
             rays: sum.tally.rays,
             cut_off_max: sum.cut_max,
             cut_off_mean: sum.cut_of_tile.iter().sum::<f64>() / pixels,
+            cut_off_is_estimate: false,
             non_finite_samples: sum.non_finite,
             shadow_rays_facing_away: sum.tally.facing_away,
             branches_below_cut: sum.tally.below_cut,
