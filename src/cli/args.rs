@@ -11,7 +11,12 @@ use tison::backend::BackendKind;
 use tison::film::{Aov, Tonemap};
 use tison::scene::desc::LensSampler;
 
-const EXIT_CODES: &str = "\
+/// What the whole help ends with.
+const AFTER_HELP: &str = "\
+A flag wins over the scene file, keys set by -D included, and the file over the default. Flags about the camera
+change parts of the scene's own; its clipping distances stay, and so does the shape of a pixel when --size has
+another shape than the scene's. --print-config shows what comes out.
+
 Exit codes:
   0  done
   1  the render failed
@@ -27,7 +32,7 @@ Exit codes:
 #[command(
     name = "tison",
     version = VERSION.as_str(),
-    after_long_help = EXIT_CODES,
+    after_long_help = AFTER_HELP,
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
     arg_required_else_help = true,
@@ -58,7 +63,7 @@ impl Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Render a scene or mesh to an image (the same as tison FILE)
-    #[command(after_long_help = EXIT_CODES, arg_required_else_help = true)]
+    #[command(after_long_help = AFTER_HELP, arg_required_else_help = true)]
     Render(Box<RenderArgs>),
     /// Tell what is in a file: counts, bounds, materials, what rendering it takes
     Info(InfoArgs),

@@ -2,7 +2,7 @@
 
 use super::VERSION;
 use super::args::Cli;
-use super::exit::{Exit, Failure};
+use super::exit::{Exit, Failure, Place};
 use super::notice::Notice;
 use super::style::{Style, counted};
 use clap::CommandFactory;
@@ -68,16 +68,14 @@ impl Messages {
 }
 
 fn describe(failure: &Failure, style: Style) -> String {
-    if !failure.diagnostics.is_empty() {
-        let shown: Vec<String> = failure.diagnostics.iter().map(|d| d.render(style.look())).collect();
-        return shown.join("\n\n");
-    }
     let mut out = format!("{} {}", style.error("error:"), failure.what);
-    let excerpt = failure.place.as_ref().and_then(|(path, line, column)| {
-        let text = source_line(path, *line)?;
-        Some(excerpt(&text, *line, *column, style))
-    });
-    out.extend(excerpt);
+    match &failure.place {
+        Place::Unknown => {}
+        Place::Text(path, line, column) => {
+            out.extend(source_line(path, *line).map(|text| excerpt(&text, *line, *column, style)));
+        }
+        Place::Scene(list) => out = list.iter().map(|d| d.render(style.look())).collect::<Vec<_>>().join("\n\n"),
+    }
     let mut cause = failure.cause.as_deref().map(|e| e as &dyn Error);
     while let Some(e) = cause {
         out += &format!("\n  caused by: {e}");
@@ -213,7 +211,7 @@ mod tests {
         let path = dir.path().join("a.obj");
         std::fs::write(&path, "v 0 0 0\nf\t1 2 x9\r\n").unwrap();
         let failure = Failure {
-            place: Some((path, 2, 7)),
+            place: Place::Text(path, 2, 7),
             ..Failure::new(Exit::Input, "a.obj:2:7: not an index").help("fix it")
         };
         let text = describe(&failure, Style::of_stderr());
@@ -222,8 +220,8 @@ mod tests {
 
     #[test]
     fn a_place_that_is_not_there_is_left_out() {
-        for place in [(PathBuf::from("/no/such/file"), 1, 1), (PathBuf::from("/dev/zero"), 3, 1)] {
-            let failure = Failure { place: Some(place), ..Failure::new(Exit::Input, "gone") };
+        for (path, line) in [("/no/such/file", 1), ("/dev/zero", 3)] {
+            let failure = Failure { place: Place::Text(path.into(), line, 1), ..Failure::new(Exit::Input, "gone") };
             assert_eq!(describe(&failure, Style::of_stderr()), "error: gone");
         }
     }
