@@ -2,7 +2,7 @@
 
 use super::exit::Failure;
 use super::message::Messages;
-use super::plan::{Input, Plan};
+use super::plan::Plan;
 use super::render::{Done, Ready};
 use super::settings::Settings;
 use super::style::{bytes, counted, grouped, seconds};
@@ -117,10 +117,7 @@ impl<'a> Report<'a> {
             (c.textures, "texture"),
             (c.lights, "light"),
         ];
-        let always = |what: &str| match self.plan.kind {
-            Input::Mesh => matches!(what, "triangle" | "vertex" | "material" | "light"),
-            Input::Scene => matches!(what, "material" | "light"),
-        };
+        let always = |what: &str| matches!(what, "material" | "light");
         let told = all.iter().filter(|&&(n, what)| n > 0 || always(what)).map(|&(n, what)| counted(n as u64, what));
         let mut line = format!("input     {}: {}", self.plan.input.display(), told.collect::<Vec<_>>().join(", "));
         if c.degenerate > 0 {
