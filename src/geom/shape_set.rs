@@ -281,7 +281,7 @@ pub(crate) fn normal_matrix(m: &DMat3) -> DMat3 {
 ///
 /// # Errors
 /// As [`Affine::push`].
-pub(crate) fn invert(to_world: &DAffine3) -> Result<DMat3, ShapeError> {
+pub fn invert(to_world: &DAffine3) -> Result<DMat3, ShapeError> {
     /// Share of the box's volume that the rounding of the entries alone can make.
     const NOTHING: f64 = 4e-15;
     if !to_world.is_finite() {
