@@ -277,8 +277,11 @@ pub(crate) fn normal_matrix(m: &DMat3) -> DMat3 {
     cof * det.signum()
 }
 
-/// Inverse of the linear part of `to_world`.
-pub(crate) fn invert(to_world: &DAffine3) -> Result<DMat3, ShapeError> {
+/// Inverse of the linear part of `to_world`. A ray goes back by `inverse * (o - translation)` and `inverse * d`.
+///
+/// # Errors
+/// As [`Affine::push`].
+pub fn invert(to_world: &DAffine3) -> Result<DMat3, ShapeError> {
     /// Share of the box's volume that the rounding of the entries alone can make.
     const NOTHING: f64 = 4e-15;
     if !to_world.is_finite() {

@@ -1,8 +1,8 @@
 //! What there is to hit: meshes, placed copies of meshes, and sets of analytic shapes.
 
 use super::obj::CornerData;
-use crate::geom::{Affine, Bounds, Cube, Cylinder, Plain, Quad, ShapeError, ShapeSet, Sphere, TriangleMesh};
-use crate::geom::{invert, normal_matrix};
+use crate::geom::normal_matrix;
+use crate::geom::{Affine, Bounds, Cube, Cylinder, Plain, Quad, ShapeSet, Sphere, TriangleMesh};
 use glam::{DAffine3, DMat3, Vec2, Vec3};
 use std::sync::Arc;
 
@@ -181,18 +181,16 @@ impl MeshData {
 }
 
 impl Instance {
-    /// `mesh` placed by `to_scene`.
-    ///
-    /// # Errors
-    /// When the transform is not finite or flattens space.
-    pub fn new(mesh: Mesh, to_scene: DAffine3) -> Result<Self, ShapeError> {
+    /// `mesh` placed by `to_scene`, which can be undone.
+    #[must_use]
+    pub fn new(mesh: Mesh, to_scene: DAffine3) -> Self {
         let m = to_scene.matrix3;
-        let inverse = invert(&to_scene)?;
+        let inverse = m.inverse();
         let size = |m: DMat3| DMat3::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs());
         let rows = (size(m) * size(inverse)).transpose();
         let spread =
             [rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.element_sum()).into_iter().fold(1.0, f64::max);
-        Ok(Self { mesh, to_scene, normal_to_scene: normal_matrix(&m), spread })
+        Self { mesh, to_scene, normal_to_scene: normal_matrix(&m), spread }
     }
 
     /// What to add to a triangle's size where a ray is kept off it (see
