@@ -57,7 +57,8 @@ const BACKGROUND: Vec3 = Vec3::new(0.055, 0.065, 0.08);
 pub fn load(path: &Path, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
     let read = obj::ReadOptions {
         normals: true,
-        uv: false,
+        uv: obj::Uv::Never,
+        materials: true,
         allow: &options.allow,
         cancel: options.cancel,
         progress: options.progress,
