@@ -27,7 +27,7 @@ pub use load::{LoadOptions, Loaded, load};
 pub use material::{Material, Reflect, Textured};
 pub use needs::Needs;
 pub use object::{AnyShapes, Instance, Mesh, MeshData, MeshPaint, Object, Shapes};
-pub use texture::Texture;
+pub use texture::{Encoding, Texture};
 
 use crate::geom::{Bounds, ShapeSet};
 use crate::math::Frame;
