@@ -11,6 +11,7 @@ mod ray;
 mod shape;
 mod shape_set;
 mod sphere;
+mod transform;
 pub mod triangle;
 
 pub use bounds::Bounds;
@@ -22,6 +23,6 @@ pub use packet::{Coherence, HitLanes, LANES, PacketBatch, RayHitPacket, RayPacke
 pub use quad::Quad;
 pub use ray::{Hit, INVALID_ID, Ray};
 pub use shape::{Lanes, Shape, ShapeError, ShapePoint};
-pub(crate) use shape_set::normal_matrix;
 pub use shape_set::{Affine, Plain, ShapeSet};
 pub use sphere::Sphere;
+pub(crate) use transform::{invert, mirrors, normal_matrix};

@@ -1,7 +1,7 @@
 //! Refraction, total reflection, media in and beside each other, mirrors.
 
 use crate::kit::{Random, Told, build, job, load, looking, rays, render};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use tison::backend::BackendKind;
 use tison::render::Job;
 
@@ -44,11 +44,17 @@ fn a_parallel_slab_leaves_rays_parallel() {
     let scene = load(&(WALLS.to_owned() + slab));
     for &kind in BackendKind::COMPILED {
         let backend = build(kind, &scene);
+        let turn = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 25f64.to_radians());
         let mut random = Random(3);
         let mut through = 0;
         for _ in 0..2000 {
             let eye = 5.0 * random.direction();
             let d = (random.direction() * 3.0 - eye).normalize();
+            let (local, along) = (turn.inverse() * eye, turn.inverse() * d);
+            // Not from inside, and not so flat that it leaves by an end.
+            if local.y.abs() < 0.3 || along.y.abs() < 0.2 {
+                continue;
+            }
             let told = rays(&scene, &looking(eye, d), &backend, &one(1), (0, 0));
             let legs = legs(eye, &told);
             if legs.len() == 3 && told.iter().skip(1).all(|t| t.what == "refracted") {
@@ -164,7 +170,8 @@ fn sixty_four_facing_mirrors_keep_their_direction() {
         assert_eq!(told.iter().filter(|t| t.what == "reflected").count(), 64);
         for (i, leg) in legs(DVec3::ZERO, &told).iter().enumerate() {
             let want = DVec3::new(d.x, d.y, if i % 2 == 0 { d.z } else { -d.z });
-            assert!(angle(*leg, want) < 2e-6, "{kind:?}, mirror {i}: {} rad off", angle(*leg, want));
+            // A leg starts off the mirror by four roundings of its size, 50.
+            assert!(angle(*leg, want) < 5e-6, "{kind:?}, mirror {i}: {} rad off", angle(*leg, want));
         }
     }
 }
