@@ -25,4 +25,5 @@ pub use ray::{Hit, INVALID_ID, Ray};
 pub use shape::{Lanes, Shape, ShapeError, ShapePoint};
 pub use shape_set::{Affine, Plain, ShapeSet};
 pub use sphere::Sphere;
-pub(crate) use transform::{invert, mirrors, normal_matrix};
+pub use transform::invert;
+pub(crate) use transform::{mirrors, normal_matrix};

@@ -35,7 +35,7 @@ pub(crate) fn normal_matrix(m: &DMat3) -> DMat3 {
 ///
 /// # Errors
 /// [`ShapeError::TransformNotFinite`]; [`ShapeError::Singular`] when there is no inverse to f64 rounding.
-pub(crate) fn invert(to_world: &DAffine3) -> Result<DMat3, ShapeError> {
+pub fn invert(to_world: &DAffine3) -> Result<DMat3, ShapeError> {
     /// Share of the box's volume that the rounding of the entries alone can make.
     const NOTHING: f64 = 4e-15;
     if !to_world.is_finite() {
