@@ -5,6 +5,7 @@ use crate::geom::{Bounds, Lanes, ShapeSet};
 use crate::simd::{self, Kernel};
 use embree4_sys as sys;
 use std::any::Any;
+use std::mem::MaybeUninit;
 use std::sync::Arc;
 
 /// A set of primitives of one kind. `prim` is always below [`len`](Self::len) as it was when the set was added.
@@ -257,16 +258,17 @@ impl<const N: usize> Packet<N> {
         any.then_some(found)
     }
 
-    /// Writes `word` to the lanes that `found` something. Others must be left alone.
+    /// Writes `word` to the lanes that `found` something; others keep what they have, be it uninitialised. That is a
+    /// blend, which becomes vector code; a branch per lane does not.
     #[inline(always)]
     fn put(&mut self, found: &[bool; N], field: usize, word: impl Fn(usize) -> u32) {
+        // SAFETY: a field of the packet.
+        let first = unsafe { self.words.add(field * N) };
+        // SAFETY: as above, this call's alone.
+        let lanes = unsafe { &mut *first.cast::<[MaybeUninit<u32>; N]>() };
+        let (old, new): ([_; N], [_; N]) = (*lanes, std::array::from_fn(word));
         for lane in 0..N {
-            if found[lane] {
-                // SAFETY: a lane of a field of the packet.
-                let place = unsafe { self.words.add(field * N + lane) };
-                // SAFETY: as above, and this call's alone.
-                unsafe { place.write(word(lane)) };
-            }
+            lanes[lane] = if found[lane] { MaybeUninit::new(new[lane]) } else { old[lane] };
         }
     }
 }

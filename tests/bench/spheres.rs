@@ -2,7 +2,7 @@
 //! same packets with the same flags, on one thread, ROBUST both, in turn. Then the classes that
 //! Embree has no primitive for, alone.
 //!
-//!     cargo bench --bench spheres -- [--counts N,N,...] [--side PIXELS] [--rounds N]
+//!     cargo bench --bench spheres -- [--counts N,N,...] [--side PIXELS] [--rounds N] [--only WORD]
 //!
 //! The shapes lie at random in a cube, so large that about half of the camera rays hit one. How
 //! many rays the two disagree about is counted: Embree's own test is in f32.
@@ -38,11 +38,13 @@ struct Args {
     counts: Vec<u32>,
     side: u32,
     rounds: usize,
+    /// What the names of the rows to run have in them.
+    only: String,
 }
 
 impl Args {
     fn parse() -> Result<Self, Box<dyn std::error::Error>> {
-        let mut out = Self { counts: vec![1000, 100_000, 1_000_000], side: 1024, rounds: 7 };
+        let mut out = Self { counts: vec![1000, 100_000, 1_000_000], side: 1024, rounds: 7, only: String::new() };
         let mut args = std::env::args().skip(1).filter(|a| a != "--bench");
         while let Some(arg) = args.next() {
             let value = args.next().ok_or(format!("{arg} needs a value"))?;
@@ -50,6 +52,7 @@ impl Args {
                 "--counts" => out.counts = value.split(',').map(str::parse).collect::<Result<_, _>>()?,
                 "--side" => out.side = value.parse::<u32>()? / 4 * 4,
                 "--rounds" => out.rounds = value.parse()?,
+                "--only" => out.only = value,
                 flag => return Err(format!("unknown flag {flag}").into()),
             }
         }
@@ -86,6 +89,9 @@ fn compare(device: &Device, centers: &[DVec3], radius: f64, args: &Args) -> Resu
 fn classes(device: &Device, centers: &[DVec3], radius: f64, args: &Args) -> Result<(), Box<dyn std::error::Error>> {
     let camera = camera_rays(args.side);
     let alone = |name: &str, scene: Scene| {
+        if !name.contains(&args.only) {
+            return;
+        }
         let mut batch = camera.clone();
         let rates =
             (0..args.rounds).map(|_| rate(&mut batch, &camera, |b| scene.intersect_batch(b, Coherence::Coherent)));
@@ -106,6 +112,9 @@ fn row<P: Batch>(
     ours: impl Fn(&mut PacketBatch<P>),
     own: impl Fn(&mut PacketBatch<P>),
 ) {
+    if !name.contains(&args.only) {
+        return;
+    }
     let (mut a, mut b) = (fresh.clone(), fresh.clone());
     let rounds: Vec<_> =
         (0..=args.rounds).map(|_| (rate(&mut a, fresh, &ours), rate(&mut b, fresh, &own))).skip(1).collect();
