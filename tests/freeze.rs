@@ -341,7 +341,7 @@ fn nothing_that_is_unused_is_read() {
         material = 'used'";
     let files = [("a.obj", &*format!("mtllib not there.mtl\nusemtl x\nvt 0 0\n{}", TRIANGLE.replace("f 1", "f 1/1")))];
     let loaded = scene(text, &files);
-    assert_eq!(loaded.unused, Unused { materials: 1, textures: 2 });
+    assert_eq!(loaded.unused, Unused { materials: 1, textures: 2, lights: 0 });
     assert_eq!(loaded.warnings, []);
     let names: Vec<_> = loaded.scene.materials.iter().map(|m| m.name.as_str()).collect();
     assert_eq!(names, ["flat", "used"]);
@@ -420,7 +420,7 @@ fn a_mesh_brings_its_own_materials_and_their_images() {
     let bare = folder.good("models/a.obj");
     let names = |l: &Loaded| l.scene.materials.iter().map(|m| m.name.clone()).collect::<Vec<_>>();
     assert_eq!(names(&bare), ["wood", "red"]);
-    assert_eq!(bare.unused, Unused { materials: 1, textures: 1 });
+    assert_eq!(bare.unused, Unused { materials: 1, textures: 1, lights: 0 });
     assert_eq!((seen(&bare, 0.25, 0.75), seen(&bare, 0.75, 0.75)), (Vec3::X, Vec3::Y));
     assert_eq!(bare.scene.materials[0].texture.expect("wood").diffuse, Vec3::new(0.5, 1.0, 1.0));
     assert_eq!((bare.scene.materials[0].diffuse, bare.scene.materials[1].texture), (Vec3::ZERO, None));
@@ -431,7 +431,7 @@ fn a_mesh_brings_its_own_materials_and_their_images() {
     assert_eq!(names(&loaded), ["default", "wood", "red"]);
     assert_eq!(mesh(&loaded, 1).paint, MeshPaint::PerFace(1));
     assert_eq!([0, 1, 2].map(|t| mesh(&loaded, 1).material(t)), [1, 1, 2]);
-    assert_eq!(loaded.unused, Unused { materials: 2, textures: 1 });
+    assert_eq!(loaded.unused, Unused { materials: 2, textures: 1, lights: 0 });
     let loaded = folder.good("b.toml");
     assert_eq!(names(&loaded), ["blue", "wood", "red"]);
     assert_eq!((mesh(&loaded, 0).paint, mesh(&loaded, 1).paint), (MeshPaint::PerFace(1), MeshPaint::One(0)));

@@ -81,6 +81,8 @@ impl Input {
     }
 }
 
+const ANOTHER_NAME: &str = "name another file with -o, or with --stats";
+
 impl Plan {
     /// Checks the flags together.
     pub fn new(args: &RenderArgs) -> Result<Self, Failure> {
@@ -162,13 +164,25 @@ impl Plan {
         Ok(())
     }
 
+    /// What was read for the scene stays as it is too.
+    pub fn check_read(&self, read: &[PathBuf]) -> Result<(), Failure> {
+        let written = self.files();
+        match written.iter().find(|file| read.iter().any(|r| same_file(file, r))) {
+            Some(file) => {
+                let what = format!("{} is read for the scene: it would be overwritten", file.display());
+                Err(Failure::usage(what).help(ANOTHER_NAME))
+            }
+            None => Ok(()),
+        }
+    }
+
     /// The input stays as it is, and no file is written twice.
     fn refuse_overwriting(&self) -> Result<(), Failure> {
         let files = self.files();
         for (i, file) in files.iter().enumerate() {
             if same_file(file, &self.input) {
                 let what = format!("{} is the input: it would be overwritten", file.display());
-                return Err(Failure::usage(what).help("name another file with -o"));
+                return Err(Failure::usage(what).help(ANOTHER_NAME));
             }
             if files[..i].iter().any(|f| f == file || (same_file(f, file) && !film::is_special_file(f))) {
                 return Err(Failure::usage(format!("{} would be written twice", file.display())));

@@ -46,17 +46,21 @@ pub struct Loaded {
     pub warnings: Vec<Warning>,
     /// What was not read because nothing uses it.
     pub unused: Unused,
+    /// The scene or mesh file and all that it led to, but for the material libraries of meshes.
+    pub files: Vec<PathBuf>,
     /// Seconds spent on reading textures.
     pub texture_seconds: f64,
 }
 
-/// What a scene and the libraries of its meshes describe or name, but no object needs.
+/// What a scene and the libraries of its meshes describe or name, but no picture of it needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Unused {
     /// Materials that no object has.
     pub materials: usize,
     /// Images that nothing samples.
     pub textures: usize,
+    /// Lights that give no light.
+    pub lights: usize,
 }
 
 /// Colour seen where nothing is hit, for a mesh that says nothing about it.
@@ -86,6 +90,7 @@ fn load_mesh(path: &Path, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
     let wanted = Wanted { uv: Uv::IfTextured, materials: true, v_down: false };
     let file = MeshFile::read(path, wanted, &mut assets, options.progress)?;
     assets.read_images_of_meshes(0)?;
+    let files = assets.files(Vec::new());
     if options.smooth.is_some() && file.has_normals() {
         let what = "the file has normals of its own: --smooth changes nothing";
         assets.warnings.push(Warning::about(path, what.into()));
@@ -109,6 +114,7 @@ fn load_mesh(path: &Path, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
         diagnostics: Vec::new(),
         warnings,
         unused,
+        files,
         texture_seconds,
     })
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use tison::geom::TriangleMesh;
 use tison::math::Frame;
 use tison::scene::desc::RenderDesc;
-use tison::scene::{Material, Mesh, MeshData, MeshPaint, Object, Scene};
+use tison::scene::{Material, Mesh, MeshData, MeshPaint, Object, Scene, Unused};
 
 const MAIN: CameraDesc = CameraDesc {
     eye: DVec3::new(0.0, 2.0, 8.0),
@@ -51,8 +51,9 @@ fn loaded(cameras: &[(&str, CameraDesc)]) -> Loaded {
         cameras,
         diagnostics: vec![],
         warnings: vec![],
+        unused: Unused::default(),
+        files: vec![],
         texture_seconds: 0.0,
-        unused: Default::default(),
     }
 }
 

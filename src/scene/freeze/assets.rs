@@ -18,11 +18,26 @@ pub struct Assets<'a> {
     pub images: Images,
     pub warnings: Vec<Warning>,
     pub unused: Unused,
+    /// Mesh files that were read.
+    pub meshes: Vec<PathBuf>,
 }
 
 impl<'a> Assets<'a> {
     pub fn new(options: &'a LoadOptions<'a>, encoding: Encoding) -> Self {
-        Self { options, images: Images::new(encoding), warnings: Vec::new(), unused: Unused::default() }
+        Self {
+            options,
+            images: Images::new(encoding),
+            warnings: Vec::new(),
+            unused: Unused::default(),
+            meshes: Vec::new(),
+        }
+    }
+
+    /// All files so far, after those in `before`.
+    pub fn files(&self, mut before: Vec<PathBuf>) -> Vec<PathBuf> {
+        before.extend(self.meshes.iter().cloned());
+        before.extend(self.images.files().map(Path::to_owned));
+        before
     }
 
     /// Reads the images that meshes named since there were `before`. One that cannot be used is a warning.

@@ -63,6 +63,11 @@ impl Images {
         }
     }
 
+    /// The files of all slots.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        self.slots.iter().map(|slot| &*slot.path)
+    }
+
     /// Number of slots.
     pub fn len(&self) -> usize {
         self.slots.len()

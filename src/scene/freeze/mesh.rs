@@ -48,6 +48,7 @@ impl MeshFile {
             progress,
         };
         let file = obj::read(path, &read)?;
+        assets.meshes.push(path.to_owned());
         assets.warnings.extend(file.warnings);
         assets.unused.materials += file.counts.unused_materials as usize;
         assets.unused.textures += file.counts.unused_images as usize;

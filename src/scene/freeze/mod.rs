@@ -48,6 +48,7 @@ pub fn load(path: &Path, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
     let meshes = read_meshes(&plan.sources, &mut assets)?;
     assets.read_images_of_meshes(named)?;
 
+    let files = assets.files(desc.files.clone());
     let placed = Placed::of(&desc, &plan.uses, &meshes, &mistakes)?;
     let Assets { images, warnings, unused, .. } = assets;
     let (textures, numbers, texture_seconds) = images.finish();
@@ -65,7 +66,7 @@ pub fn load(path: &Path, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
         background: palette::rgb(render.background.unwrap_or_default().into()),
         course_rules: render.course_rules,
     };
-    Ok(Loaded { scene, render, cameras, diagnostics, warnings, unused, texture_seconds })
+    Ok(Loaded { scene, render, cameras, diagnostics, warnings, unused, files, texture_seconds })
 }
 
 /// Reads the images of the materials in use.

@@ -64,7 +64,7 @@ impl Plan {
                 Some(Some(_)) => Uv::Always,
                 _ => Uv::Never,
             });
-            plan.uses.push(Use { source, smooth: smooth.or(assets.options.smooth), material });
+            plan.uses.push(Use { source, smooth: assets.options.smooth.or(*smooth), material });
         }
         plan
     }
@@ -83,7 +83,7 @@ fn plan_images(
     palette.entries.iter().map(|entry| slot(&desc.materials[(*entry)?])).collect()
 }
 
-/// Materials that no object has, and images that nothing samples.
+/// Materials that no object has, images that nothing samples, lights that give none.
 pub fn unused(desc: &SceneDesc, palette: &Palette) -> Unused {
     let used = || palette.entries.iter().flatten().map(|&i| &desc.materials[i]);
     let image = |m: &MaterialDesc| m.texture.as_ref().map(|t| t.path.clone());
@@ -92,5 +92,6 @@ pub fn unused(desc: &SceneDesc, palette: &Palette) -> Unused {
     Unused {
         materials: desc.materials.len() - used().count(),
         textures: named.iter().filter(|p| !sampled.contains(**p)).count(),
+        lights: desc.lights.iter().filter(|l| l.color == [0.0; 3]).count(),
     }
 }
