@@ -95,7 +95,7 @@ impl Scene {
     /// are more than twice as fast.
     fn route(&self, coherence: Coherence) -> Route {
         match self.width {
-            _ if self.shapes && coherence == Coherence::Incoherent => Route::Singles,
+            _ if self.contents.shape_sets > 0 && coherence == Coherence::Incoherent => Route::Singles,
             16 => Route::Whole,
             8 => Route::Eights,
             4 => Route::Fours,
@@ -122,15 +122,19 @@ impl Scene {
         // SAFETY: the scene is committed; `query` is ours alone, initialised, and aligned by its type; no arguments
         // mean the defaults, among them incoherent.
         unsafe { sys::rtcIntersect1(self.raw(), &mut query, ptr::null_mut()) };
-        let hit = &query.hit;
-        (hit.geomID != INVALID_ID).then(|| Hit {
+        let found = &query.hit;
+        if found.geomID == INVALID_ID {
+            return None;
+        }
+        let hit = Hit {
             t: query.ray.tfar,
-            u: hit.u,
-            v: hit.v,
-            ng: Vec3::new(hit.Ng_x, hit.Ng_y, hit.Ng_z),
-            prim_id: hit.primID,
-            geom_id: hit.geomID,
-        })
+            u: found.u,
+            v: found.v,
+            ng: Vec3::new(found.Ng_x, found.Ng_y, found.Ng_z),
+            prim_id: found.primID,
+            geom_id: found.geomID,
+        };
+        Some(if self.placed.is_empty() { hit } else { self.placed.resolve(hit, found.instID[0]) })
     }
 
     #[inline]
@@ -159,6 +163,9 @@ impl Scene {
             // SAFETY: the scene is committed, and `args` were filled by Embree.
             unsafe { RayPacket::<N>::intersect(valid, self.raw(), packet, args) };
         });
+        if !self.placed.is_empty() {
+            self.placed.resolve_lanes(packet);
+        }
     }
 
     #[inline]

@@ -1,6 +1,7 @@
 //! From geometry to a scene that answers rays.
 
 use super::fault::Fault;
+use super::instance::Placed;
 use super::user::{self, PrimSet, UserSet};
 use super::{Device, Error};
 use crate::geom::TriangleMesh;
@@ -46,14 +47,24 @@ impl Default for SceneOptions {
 pub struct SceneBuilder {
     owner: Owner,
     quality: sys::RTCBuildQuality,
-    shapes: bool,
+    pub(super) contents: Contents,
+    pub(super) placed: Placed,
 }
 
 /// A built scene: it answers rays, on any number of threads, and never changes.
 pub struct Scene {
     owner: Owner,
-    pub(super) shapes: bool,
+    pub(super) contents: Contents,
+    pub(super) placed: Placed,
     pub(super) width: usize,
+}
+
+/// What a scene is made of.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Contents {
+    pub meshes: u32,
+    pub shape_sets: u32,
+    pub instances: u32,
 }
 
 /// Fields are dropped in order: the C scene goes first, then what it points at, then the device.
@@ -107,7 +118,7 @@ impl SceneBuilder {
         // SAFETY: as above.
         unsafe { sys::rtcSetSceneBuildQuality(raw.as_ptr(), quality) };
         device.check("set the options of a scene")?;
-        Ok(Self { owner, quality, shapes: false })
+        Ok(Self { owner, quality, contents: Contents::default(), placed: Placed::default() })
     }
 
     /// Adds a mesh and returns its `geom_id`; ids count up from 0. The mesh is shared, not copied.
@@ -129,9 +140,10 @@ impl SceneBuilder {
             }
         };
         let (points, indices) = (mesh.padded_points().as_ptr().cast(), mesh.faces().as_ptr().cast());
-        self.owner.keep.push(mesh);
+        self.keep(mesh);
         share(sys::RTCBufferType::RTC_BUFFER_TYPE_VERTEX, sys::RTCFormat::RTC_FORMAT_FLOAT3, points, vertices);
         share(sys::RTCBufferType::RTC_BUFFER_TYPE_INDEX, sys::RTCFormat::RTC_FORMAT_UINT3, indices, faces);
+        self.contents.meshes += 1;
         self.attach(&geometry, "add a mesh")
     }
 
@@ -144,7 +156,7 @@ impl SceneBuilder {
         let geometry = Geometry::new(&self.owner.device, sys::RTCGeometryType::RTC_GEOMETRY_TYPE_USER)?;
         let set = Arc::new(UserSet { prims: set, fault: self.owner.fault.clone() });
         let user = Arc::as_ptr(&set).cast_mut().cast::<c_void>();
-        self.owner.keep.push(set);
+        self.keep(set);
         // SAFETY: the geometry is live and ours alone.
         unsafe { sys::rtcSetGeometryUserPrimitiveCount(geometry.raw(), count) };
         // SAFETY: `keep` holds the set until the scene is released; callbacks only read it.
@@ -155,11 +167,11 @@ impl SceneBuilder {
         unsafe { sys::rtcSetGeometryIntersectFunction(geometry.raw(), Some(user::intersect::<S>)) };
         // SAFETY: as above. Without this one no shape would throw a shadow.
         unsafe { sys::rtcSetGeometryOccludedFunction(geometry.raw(), Some(user::occluded::<S>)) };
-        self.shapes = true;
+        self.contents.shape_sets += 1;
         self.attach(&geometry, "add shapes")
     }
 
-    fn attach(&mut self, geometry: &Geometry, doing: &'static str) -> Result<u32, Error> {
+    pub(super) fn attach(&mut self, geometry: &Geometry, doing: &'static str) -> Result<u32, Error> {
         // SAFETY: the geometry is live. On the scene alone, low quality would still build the medium tree.
         unsafe { sys::rtcSetGeometryBuildQuality(geometry.raw(), self.quality) };
         // SAFETY: the geometry is live.
@@ -169,6 +181,15 @@ impl SceneBuilder {
         let id = unsafe { sys::rtcAttachGeometry(self.owner.raw.0.as_ptr(), geometry.raw()) };
         self.owner.device.check(doing)?;
         Ok(id)
+    }
+
+    pub(super) fn device(&self) -> &Device {
+        &self.owner.device
+    }
+
+    /// Keeps `data` until the scene has been released.
+    pub(super) fn keep(&mut self, data: Arc<dyn Any + Send + Sync>) {
+        self.owner.keep.push(data);
     }
 
     /// Builds the tree, on the device's threads.
@@ -183,7 +204,7 @@ impl SceneBuilder {
     /// # Panics
     /// With the panic of `progress` or of a [`PrimSet::bounds`], if there was one.
     pub fn commit(self, progress: Option<&(dyn Fn(f64) -> bool + Sync)>) -> Result<Scene, Error> {
-        let Self { owner, shapes, .. } = self;
+        let Self { owner, contents, placed, .. } = self;
         let watch = Watch { progress, fault: &owner.fault, cancelled: AtomicBool::new(false) };
         let raw = owner.raw.0.as_ptr();
         let user = (&raw const watch).cast_mut().cast::<c_void>();
@@ -200,7 +221,7 @@ impl SceneBuilder {
         }
         built?;
         let width = owner.device.packet_width();
-        Ok(Scene { owner, shapes, width })
+        Ok(Scene { owner, contents, placed, width })
     }
 }
 
@@ -218,6 +239,11 @@ impl Scene {
     #[must_use]
     pub fn device(&self) -> &Device {
         &self.owner.device
+    }
+
+    pub(super) fn is_one_mesh(&self) -> bool {
+        let Contents { meshes, shape_sets, instances } = self.contents;
+        (meshes, shape_sets, instances) == (1, 0, 0)
     }
 
     #[inline]
@@ -239,16 +265,16 @@ impl fmt::Debug for Scene {
 }
 
 /// Our own reference to a geometry; a scene that it is attached to has another.
-struct Geometry(NonNull<sys::RTCGeometryTy>);
+pub(super) struct Geometry(NonNull<sys::RTCGeometryTy>);
 
 impl Geometry {
-    fn new(device: &Device, kind: sys::RTCGeometryType) -> Result<Self, Error> {
+    pub fn new(device: &Device, kind: sys::RTCGeometryType) -> Result<Self, Error> {
         // SAFETY: the device is live.
         let raw = unsafe { sys::rtcNewGeometry(device.raw(), kind) };
         created(raw, device, "create a geometry").map(Self)
     }
 
-    fn raw(&self) -> sys::RTCGeometry {
+    pub fn raw(&self) -> sys::RTCGeometry {
         self.0.as_ptr()
     }
 }

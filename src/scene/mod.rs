@@ -140,6 +140,13 @@ impl Scene {
         self.meshes().map(|m| m.triangles.face_count()).sum()
     }
 
+    /// Analytic shapes of all classes.
+    #[must_use]
+    pub fn shapes(&self) -> usize {
+        let count = |o: &Object| if let Object::Shapes(s) = o { s.set.len() as usize } else { 0 };
+        self.objects.iter().map(count).sum()
+    }
+
     /// Bytes of geometry, normals, texture coordinates, material indices and textures.
     #[must_use]
     pub fn bytes(&self) -> usize {
