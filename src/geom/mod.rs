@@ -23,4 +23,5 @@ pub use quad::Quad;
 pub use ray::{Hit, INVALID_ID, Ray};
 pub use shape::{Lanes, Shape, ShapeError, ShapePoint};
 pub use shape_set::{Affine, Plain, ShapeSet, invert};
+pub(crate) use shape_set::normal_matrix;
 pub use sphere::Sphere;

@@ -34,6 +34,9 @@ pub trait ShapeSet: Send + Sync {
     where
         Self: Sized;
 
+    /// Whether `p` lies inside of shape `prim`; see [`Shape::contains`].
+    fn contains(&self, prim: u32, p: DVec3) -> bool;
+
     /// Bytes of the shapes.
     fn bytes(&self) -> usize;
 
@@ -93,6 +96,10 @@ impl<S: Shape> ShapeSet for Plain<S> {
 
     fn bytes(&self) -> usize {
         size_of_val(&self.shapes[..])
+    }
+
+    fn contains(&self, prim: u32, p: DVec3) -> bool {
+        self.shapes[prim as usize].contains(p)
     }
 
     fn bounds(&self, prim: u32) -> Bounds {
@@ -183,6 +190,11 @@ impl<S: Shape> ShapeSet for Affine<S> {
         self.placed.len() as u32
     }
 
+    fn contains(&self, prim: u32, p: DVec3) -> bool {
+        let placed = &self.placed[prim as usize];
+        placed.shape.contains(placed.inverse * (p - placed.translation))
+    }
+
     fn bytes(&self) -> usize {
         size_of_val(&self.placed[..]) + size_of_val(&self.to_world[..])
     }
@@ -258,7 +270,7 @@ fn cofactors(m: &DMat3) -> DMat3 {
 
 /// What takes normals to world space: the cofactor matrix with the determinant's sign, which is the
 /// inverse transpose up to a positive factor, without a division.
-fn normal_matrix(m: &DMat3) -> DMat3 {
+pub(crate) fn normal_matrix(m: &DMat3) -> DMat3 {
     let m = *m * (1.0 / magnitude(m));
     let cof = cofactors(&m);
     let det = m.x_axis.dot(cof.x_axis);

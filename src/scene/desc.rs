@@ -74,6 +74,22 @@ pub enum LensSampler {
     PolarUniformRadius,
 }
 
+impl LensSampler {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Concentric, Self::Polar, Self::Rejection, Self::PolarUniformRadius];
+
+    /// The name in scene files and on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Concentric => "concentric",
+            Self::Polar => "polar",
+            Self::Rejection => "rejection",
+            Self::PolarUniformRadius => "polar-uniform-radius",
+        }
+    }
+}
+
 /// A camera and its name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedCamera {

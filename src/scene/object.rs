@@ -1,6 +1,7 @@
 //! What there is to hit: meshes, placed copies of meshes, and sets of analytic shapes.
 
 use super::obj::CornerData;
+use crate::geom::normal_matrix;
 use crate::geom::{Affine, Bounds, Cube, Cylinder, Plain, Quad, ShapeSet, Sphere, TriangleMesh};
 use glam::{DAffine3, DMat3, Vec2, Vec3};
 use std::sync::Arc;
@@ -58,6 +59,9 @@ pub struct Instance {
     pub to_scene: DAffine3,
     /// What takes normals to scene space, up to their length.
     pub normal_to_scene: DMat3,
+    /// How much of a coordinate's rounding one axis hands on to the others, there and back: 1
+    /// for scales along the axes, at most 3 for turns, more where the two are mixed.
+    spread: f64,
 }
 
 /// Shapes of one class and their materials.
@@ -177,6 +181,28 @@ impl MeshData {
 }
 
 impl Instance {
+    /// `mesh` placed by `to_scene`, which can be undone.
+    #[must_use]
+    pub fn new(mesh: Mesh, to_scene: DAffine3) -> Self {
+        let m = to_scene.matrix3;
+        let inverse = m.inverse();
+        let size = |m: DMat3| DMat3::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs());
+        let rows = (size(m) * size(inverse)).transpose();
+        let spread =
+            [rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.element_sum()).into_iter().fold(1.0, f64::max);
+        Self { mesh, to_scene, normal_to_scene: normal_matrix(&m), spread }
+    }
+
+    /// What to add to a triangle's size where a ray is kept off it (see
+    /// [`geom::offset_origin`](crate::geom::offset_origin)): a backend that moves the ray into
+    /// the mesh's space in f32 rounds each coordinate once more, by half an ulp of a sum of terms as
+    /// large as the point and the translation.
+    #[must_use]
+    pub fn rounding(&self, corner: Vec3) -> f32 {
+        let reach = f64::from(corner.abs().max_element()) + self.to_scene.translation.abs().max_element();
+        (2.0 * self.spread * reach) as f32
+    }
+
     /// Box around the placed box of the mesh.
     #[must_use]
     pub fn bounds(&self) -> Bounds {

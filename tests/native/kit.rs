@@ -36,8 +36,7 @@ pub fn bare(triangles: &Arc<TriangleMesh>) -> Mesh {
 }
 
 pub fn placed(mesh: &Mesh, to_scene: DAffine3) -> Object {
-    let normal_to_scene = to_scene.matrix3.inverse().transpose();
-    Object::Instance(Instance { mesh: mesh.clone(), to_scene, normal_to_scene })
+    Object::Instance(Instance::new(mesh.clone(), to_scene))
 }
 
 pub fn shapes(set: AnyShapes) -> Object {
