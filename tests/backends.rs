@@ -82,11 +82,7 @@ fn objects(kind: Kind, at: &[DAffine3], own: &Mesh) -> Vec<Object> {
     let set = match kind {
         Kind::Mesh => return vec![Object::Mesh(own.clone())],
         Kind::Placed => {
-            let placed = |&to_scene: &DAffine3| {
-                let normal_to_scene = to_scene.matrix3.inverse().transpose();
-                Object::Instance(Instance { mesh: own.clone(), to_scene, normal_to_scene })
-            };
-            return at.iter().map(placed).collect();
+            return at.iter().map(|&p| Object::Instance(Instance::new(own.clone(), p))).collect();
         }
         Kind::Spheres => AnyShapes::Spheres(plain(at, sphere)),
         Kind::Cubes => AnyShapes::Cubes(plain(at, cube)),
