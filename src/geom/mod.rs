@@ -22,6 +22,6 @@ pub use packet::{Coherence, HitLanes, LANES, PacketBatch, RayHitPacket, RayPacke
 pub use quad::Quad;
 pub use ray::{Hit, INVALID_ID, Ray};
 pub use shape::{Lanes, Shape, ShapeError, ShapePoint};
-pub(crate) use shape_set::normal_matrix;
 pub use shape_set::{Affine, Plain, ShapeSet, invert};
+pub(crate) use shape_set::{cofactors, normal_matrix};
 pub use sphere::Sphere;

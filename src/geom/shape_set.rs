@@ -262,8 +262,8 @@ fn magnitude(m: &DMat3) -> f64 {
     2f64.powi(exponent.clamp(-1000, 1000))
 }
 
-/// Columns of the cofactor matrix.
-fn cofactors(m: &DMat3) -> DMat3 {
+/// Columns of the cofactor matrix: what takes the cross product of two edges to that of the moved ones.
+pub(crate) fn cofactors(m: &DMat3) -> DMat3 {
     let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
     DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y))
 }
