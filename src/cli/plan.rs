@@ -1,7 +1,7 @@
 //! What a run will do: the flags, checked together. All that can be refused without
 //! reading the scene is refused here; what the scene file may say is settled by `settings`.
 
-use super::args::{CameraArgs, PictureArgs, ProgressMode, RenderArgs};
+use super::args::{CameraArgs, PictureArgs, ProgressMode, ReadingArgs, RenderArgs};
 use super::exit::Failure;
 use super::frame::Frame;
 use super::settings::{SIZE, Setting, Settings};
@@ -71,13 +71,16 @@ impl Input {
         if format::Format::of(path).is_some() { Self::Scene } else { Self::Mesh }
     }
 
-    /// Refuses to set keys of a mesh.
-    pub fn check_defines(self, defines: &[String], path: &Path) -> Result<(), Failure> {
-        if self == Self::Mesh && !defines.is_empty() {
+    /// Refuses to set keys of a mesh, and to allow what is no folder.
+    pub fn check_reading(self, reading: &ReadingArgs, path: &Path) -> Result<(), Failure> {
+        if self == Self::Mesh && !reading.define.is_empty() {
             let what = format!("-D sets keys of a scene file, and {} is none", path.display());
             return Err(Failure::usage(what).help("use the flags of tison render --help for a mesh"));
         }
-        Ok(())
+        match reading.allow_path.iter().find(|dir| !dir.is_dir()) {
+            Some(dir) => Err(Failure::usage(format!("--allow-path {}: there is no such folder", dir.display()))),
+            None => Ok(()),
+        }
     }
 }
 
@@ -88,7 +91,7 @@ impl Plan {
     pub fn new(args: &RenderArgs) -> Result<Self, Failure> {
         let input = args.input.clone().ok_or_else(|| Failure::usage("no file to render was given"))?;
         let kind = Input::of(&input);
-        kind.check_defines(&args.reading.define, &input)?;
+        kind.check_reading(&args.reading, &input)?;
         let outputs = outputs(args, &input)?;
         let stats = args.stats.clone().map(Target::of);
         if stats == Some(Target::Stdout) && outputs.iter().any(|o| o.target == Target::Stdout) {

@@ -197,7 +197,7 @@ impl<'a> Report<'a> {
             .map(|(name, why)| {
                 let name = name.replace('_', " ");
                 match why {
-                    stats::Skipped::Count(n) => format!("{} {name}", grouped(n)),
+                    stats::Skipped::Count(n) => format!("{name}: {}", grouped(n)),
                     stats::Skipped::Because(why) => format!("{name} ({why})"),
                 }
             })

@@ -26,4 +26,4 @@ pub use shape::{Lanes, Shape, ShapeError, ShapePoint};
 pub use shape_set::{Affine, Plain, ShapeSet};
 pub use sphere::Sphere;
 pub use transform::invert;
-pub(crate) use transform::{mirrors, normal_matrix};
+pub(crate) use transform::{cofactors, mirrors, normal_matrix};

@@ -11,7 +11,7 @@ fn magnitude(m: &DMat3) -> f64 {
 }
 
 /// Columns of the cofactor matrix.
-fn cofactors(m: &DMat3) -> DMat3 {
+pub(crate) fn cofactors(m: &DMat3) -> DMat3 {
     let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
     DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y))
 }

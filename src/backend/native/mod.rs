@@ -21,8 +21,8 @@
 //! than a millionth of its size.
 //!
 //! Of a shape only `t` is reported; [`ShapeSet::refine`](crate::geom::ShapeSet::refine) tells the
-//! rest. The normal of a placed triangle is in scene space: as wound in the mesh's own space, taken
-//! over by the inverse transpose, as Embree's is by who asks it. A mirror does not turn it over.
+//! rest. The normal of a placed triangle is in scene space, as its moved corners are wound: under a
+//! mirror it points to the side that the winding in the mesh's own space calls inner.
 
 mod beam;
 mod bins;

@@ -2,7 +2,7 @@
 
 use super::bvh::Bvh;
 use super::traverse::{Space, Waiting, Walk};
-use crate::geom::{ShapeError, invert};
+use crate::geom::{ShapeError, cofactors, invert};
 use glam::{DAffine3, DMat3, DVec3};
 
 /// Where a mesh is placed, and which one.
@@ -13,11 +13,14 @@ pub(super) struct Placed {
     /// Inverse of the linear part.
     inverse: DMat3,
     translation: DVec3,
+    /// What takes normals to the scene.
+    normals: DMat3,
 }
 
 impl Placed {
     pub(super) fn new(mesh: u32, to_scene: &DAffine3) -> Result<Self, ShapeError> {
-        Ok(Self { mesh, inverse: invert(to_scene)?, translation: to_scene.translation })
+        let normals = cofactors(&to_scene.matrix3);
+        Ok(Self { mesh, inverse: invert(to_scene)?, translation: to_scene.translation, normals })
     }
 
     /// The ray in the mesh's own space. Subtraction first, so that nothing cancels far from the
@@ -27,10 +30,9 @@ impl Placed {
         (self.inverse * (o - self.translation), self.inverse * d)
     }
 
-    /// A normal of the mesh in scene space, by the inverse transpose: it stays on the side that the
-    /// winding in the mesh's own space calls outer, under a mirror as well.
+    /// A triangle's normal in scene space: that of its moved corners, as they are wound.
     pub(super) fn normal(&self, ng: DVec3) -> DVec3 {
-        self.inverse.transpose() * ng
+        self.normals * ng
     }
 }
 

@@ -54,6 +54,7 @@ pub(super) struct TriangleRay {
 
 /// Prepares `ray`; `None` where it meets nothing because it has no direction, is not finite
 /// or ends before it begins.
+#[inline(always)]
 pub(super) fn prepare(ray: &Ray) -> Option<(BoxRay, TriangleRay)> {
     let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
     let unit = unit(o, d).filter(|_| ray.t_near < ray.t_far)?;

@@ -84,7 +84,7 @@ pub(super) struct Walk {
 
 impl Walk {
     /// `None` for a ray that meets nothing whatever there is.
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(ray: &Ray) -> Option<Self> {
         Some(Self::prepared(prepare(ray)?, ray.d))
     }
@@ -96,7 +96,7 @@ impl Walk {
         Some(Self::prepared(prepare_placed(o, d, t_near, t_far)?, Vec3::ZERO))
     }
 
-    #[inline]
+    #[inline(always)]
     fn prepared((boxes, triangles): (BoxRay, TriangleRay), d: Vec3) -> Self {
         let cull = boxes.cull(triangles.exact.t_far);
         Self { boxes, triangles, d, best: None, cull }

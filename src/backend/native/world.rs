@@ -86,7 +86,7 @@ impl World {
         match self.stack_len {
             0 => false,
             1..=SMALL_STACK => walk.descend::<ANY, Self>(self, Child::ROOT, &mut [NONE; SMALL_STACK]),
-            ..=STACK => walk.descend::<ANY, Self>(self, Child::ROOT, &mut [NONE; STACK]),
+            n if n <= STACK => walk.descend::<ANY, Self>(self, Child::ROOT, &mut [NONE; STACK]),
             _ => walk.descend::<ANY, Self>(self, Child::ROOT, &mut [NONE; 2 * STACK]),
         }
     }
