@@ -2,7 +2,7 @@
 
 use super::scene::Geometry;
 use super::{Error, Scene, SceneBuilder};
-use crate::geom::{Hit, RayHitPacket};
+use crate::geom::{Hit, HitLanes, INVALID_ID};
 use embree4_sys as sys;
 use glam::{Affine3A, DAffine3, DMat3, Mat3, Vec3};
 use std::sync::Arc;
@@ -36,7 +36,7 @@ impl SceneBuilder {
         let format = sys::RTCFormat::RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR;
         // SAFETY: the geometry is live; Embree copies the twelve floats.
         unsafe { sys::rtcSetGeometryTransform(geometry.raw(), 0, format, columns.as_ptr().cast()) };
-        self.contents.instances += 1;
+        self.contents.unsplit += 1;
         let id = self.attach(&geometry, "place a scene in another")?;
         self.placed.set(id, cofactors(&matrix));
         Ok(id)
@@ -90,12 +90,14 @@ impl Placed {
     }
 
     /// [`resolve`](Self::resolve) for each lane that hit.
-    #[inline(never)]
-    pub fn resolve_lanes<const N: usize>(&self, packet: &mut RayHitPacket<N>) {
+    pub fn resolve_lanes<const N: usize>(&self, hit: &mut HitLanes<N>) {
         for lane in 0..N {
-            let Some(hit) = packet.hit(lane) else { continue };
-            let hit = self.resolve(hit, packet.hit.inst_id[lane]);
-            packet.set_hit(lane, Some(&hit));
+            let instance = if hit.geom_id[lane] == INVALID_ID { INVALID_ID } else { hit.inst_id[lane] };
+            if let Some(normals) = self.normals.get(instance as usize) {
+                let ng = *normals * Vec3::new(hit.ng_x[lane], hit.ng_y[lane], hit.ng_z[lane]);
+                (hit.ng_x[lane], hit.ng_y[lane], hit.ng_z[lane]) = ng.into();
+                hit.geom_id[lane] = instance;
+            }
         }
     }
 }
@@ -103,7 +105,6 @@ impl Placed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::INVALID_ID;
     use glam::DVec3;
 
     #[test]
