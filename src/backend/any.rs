@@ -2,7 +2,6 @@
 
 use super::native;
 use crate::scene::Scene;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 #[cfg(feature = "embree")]
@@ -118,12 +117,10 @@ impl AnyBackend {
             #[cfg(not(feature = "embree"))]
             BackendKind::Embree => Err(Error::NotCompiledIn),
             BackendKind::Native => {
-                let meshes: Vec<_> =
-                    scene.objects.iter().filter_map(|o| o.mesh()).map(|m| Arc::clone(&m.data.triangles)).collect();
                 let quality =
                     if options.prefers_quick_build(scene) { native::Quality::Fast } else { native::Quality::Good };
                 let build = native::BuildOptions { quality, cancel: options.cancel };
-                Ok(Self::Native(native::Native::build(&meshes, &build)?))
+                Ok(Self::Native(native::Native::build(&scene.objects, &build)?))
             }
         }
     }

@@ -8,9 +8,15 @@ use glam::DVec3;
 use std::ffi::OsString;
 use std::path::PathBuf;
 use tison::backend::BackendKind;
-use tison::film::Aov;
+use tison::film::{Aov, Tonemap};
+use tison::scene::desc::LensSampler;
 
-const EXIT_CODES: &str = "\
+/// What the whole help ends with.
+const AFTER_HELP: &str = "\
+A flag wins over the scene file, keys set by -D included, and the file over the default. Flags about the camera
+change parts of the scene's own; its clipping distances stay, and so does the shape of a pixel when --size has
+another shape than the scene's. --print-config shows what comes out.
+
 Exit codes:
   0  done
   1  the render failed
@@ -21,12 +27,12 @@ Exit codes:
   70 internal error
   130, 143  stopped by SIGINT or SIGTERM; what was rendered is saved";
 
-/// Ray tracer for large meshes: Embree and a pure-Rust tracer answer the same rays
+/// Ray tracer for scenes and large meshes: Embree and a pure-Rust tracer answer the same rays
 #[derive(Debug, Parser)]
 #[command(
     name = "tison",
     version = VERSION.as_str(),
-    after_long_help = EXIT_CODES,
+    after_long_help = AFTER_HELP,
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
     arg_required_else_help = true,
@@ -56,16 +62,13 @@ impl Cli {
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Render a mesh to an image (the same as tison FILE)
-    #[command(after_long_help = EXIT_CODES, arg_required_else_help = true)]
+    /// Render a scene or mesh to an image (the same as tison FILE)
+    #[command(after_long_help = AFTER_HELP, arg_required_else_help = true)]
     Render(Box<RenderArgs>),
     /// Tell what is in a file: counts, bounds, materials, what rendering it takes
     Info(InfoArgs),
     /// Read and validate a file; render nothing
-    Check {
-        /// Mesh (.obj) to check
-        file: PathBuf,
-    },
+    Check(CheckArgs),
     /// Write an example; without a name, list them
     Example {
         #[command(subcommand)]
@@ -82,6 +85,12 @@ pub enum Command {
 
 #[derive(Debug, Subcommand)]
 pub enum Example {
+    /// A first scene file with comments: a ball, a box, a cylinder, a floor, a lens and lights
+    Scene {
+        /// Where to write it [default: stdout]
+        #[arg(short, long, value_name = "FILE.toml")]
+        output: Option<PathBuf>,
+    },
     /// A closed, displaced sphere of radius about 1 with normals, as large as you like
     Mesh {
         /// Triangles; the nearest number that such a mesh can have is taken
@@ -94,17 +103,41 @@ pub enum Example {
 }
 
 #[derive(Args, Debug)]
-pub struct InfoArgs {
-    /// Mesh (.obj) to look at
+pub struct CheckArgs {
+    /// Scene (.toml, .json, .ray) or mesh (.obj) to check
     pub file: PathBuf,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
+    /// Take warnings for errors
+    #[arg(long)]
+    pub strict: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct InfoArgs {
+    /// Scene (.toml, .json, .ray) or mesh (.obj) to look at
+    pub file: PathBuf,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// One JSON object on stdout
     #[arg(long)]
     pub json: bool,
 }
 
+/// How a file is read.
+#[derive(Args, Clone, Debug, Default)]
+pub struct ReadingArgs {
+    /// Set a key of the scene file, like render.samples=4 or object.ball.radius=2; may be repeated
+    #[arg(short = 'D', long = "define", value_name = "KEY=VALUE", value_parser = parse::define, help_heading = "Scene")]
+    pub define: Vec<String>,
+    /// A folder that the scene may name files in, besides its own; may be repeated
+    #[arg(long, value_name = "DIR", help_heading = "Scene")]
+    pub allow_path: Vec<PathBuf>,
+}
+
 #[derive(Args, Debug)]
 pub struct RenderArgs {
-    /// Mesh (.obj) to render; it is framed and lit unless told otherwise
+    /// Scene (.toml, .json, .ray) or mesh (.obj) to render; a mesh is framed and lit unless told otherwise
     #[arg(value_name = "FILE", required = true)]
     pub input: Option<PathBuf>,
 
@@ -116,104 +149,19 @@ pub struct RenderArgs {
     #[arg(long, value_name = "KIND,…", value_delimiter = ',', value_parser = aov(), help_heading = "Output")]
     pub aov: Vec<Aov>,
 
-    /// Pixels of the image
-    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse::size, help_heading = "Image")]
-    pub size: (u64, u64),
-    /// Enlarge or shrink the size
-    #[arg(long, value_name = "P%", value_parser = parse::scale, allow_hyphen_values = true, help_heading = "Image")]
-    pub scale: Option<f64>,
-    /// Render this part only: pixels, or shares from 0 to 1 if there is a dot
-    #[arg(
-        long, value_name = "x0,y0,x1,y1", value_parser = parse::region, allow_hyphen_values = true,
-        help_heading = "Image"
-    )]
-    pub crop: Option<parse::Region>,
-    /// Trace one pixel and print its ray tree; no image
-    #[arg(
-        long, value_name = "x,y", value_parser = parse::pixel, allow_hyphen_values = true, help_heading = "Image",
-        conflicts_with_all = ["output", "aov", "crop", "turntable", "stats"]
-    )]
-    pub pixel: Option<(u64, u64)>,
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    #[command(flatten)]
+    pub camera: CameraArgs,
 
-    /// Most reflections and refractions in a row
-    #[arg(short, long, value_name = "N", default_value_t = 8, allow_negative_numbers = true, help_heading = "Quality")]
-    pub recursion: u32,
-    /// Samples per pixel
-    #[arg(
-        long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..),
-        allow_negative_numbers = true, help_heading = "Quality"
-    )]
-    pub spp: u32,
-    /// Chooses the samples: the same seed gives the same bytes
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true, help_heading = "Quality")]
-    pub seed: u32,
-    /// Do not trace branches that weigh less; 0 traces the whole tree
-    #[arg(
-        long, value_name = "W", default_value = "0.0009765625", value_parser = parse::weight,
-        allow_negative_numbers = true, help_heading = "Quality"
-    )]
-    pub min_weight: f32,
-    /// With one sample, take the exact centre of each pixel, not a point beside it
-    #[arg(long, help_heading = "Quality")]
-    pub centre: bool,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Smooth a mesh without normals where its faces meet at less than this angle, in degrees
     #[arg(
         long, value_name = "ANGLE", value_parser = parse::angle, allow_negative_numbers = true,
-        help_heading = "Quality"
+        help_heading = "Scene"
     )]
     pub smooth: Option<f64>,
-
-    /// View of a bare mesh: three-quarter, front, back, left, right, top, bottom [default: three-quarter]
-    #[arg(long, value_name = "NAME", conflicts_with = "eye", help_heading = "Camera")]
-    pub camera: Option<String>,
-    /// Where the camera is
-    #[arg(
-        long, value_name = "x,y,z", value_parser = parse::vector, allow_hyphen_values = true,
-        help_heading = "Camera"
-    )]
-    pub eye: Option<DVec3>,
-    /// What it looks at [default: the middle of the mesh]
-    #[arg(
-        long, value_name = "x,y,z", value_parser = parse::vector, allow_hyphen_values = true,
-        help_heading = "Camera"
-    )]
-    pub target: Option<DVec3>,
-    /// Which way is up [default: 0,1,0]
-    #[arg(
-        long, value_name = "x,y,z", value_parser = parse::direction, allow_hyphen_values = true,
-        help_heading = "Camera"
-    )]
-    pub up: Option<DVec3>,
-    /// Vertical field of view in degrees [default: 40]
-    #[arg(
-        long, value_name = "DEGREES", value_parser = parse::fov, allow_negative_numbers = true,
-        conflicts_with = "ortho", help_heading = "Camera"
-    )]
-    pub fov: Option<f64>,
-    /// Parallel projection of this height in the mesh's units
-    #[arg(
-        long, value_name = "HEIGHT", value_parser = parse::length, allow_negative_numbers = true,
-        help_heading = "Camera"
-    )]
-    pub ortho: Option<f64>,
-    /// Radius of the lens in the mesh's units; 0 is a pinhole
-    #[arg(
-        long, value_name = "RADIUS", value_parser = parse::radius, allow_negative_numbers = true,
-        help_heading = "Camera"
-    )]
-    pub aperture: Option<f64>,
-    /// Distance to what is sharp [default: that of the target]
-    #[arg(
-        long, value_name = "DISTANCE", value_parser = parse::length, allow_negative_numbers = true,
-        requires = "aperture", help_heading = "Camera"
-    )]
-    pub focus: Option<f64>,
-    /// Render N images from once around, named IMAGE-0001 and so on
-    #[arg(
-        long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000),
-        allow_negative_numbers = true, help_heading = "Camera"
-    )]
-    pub turntable: Option<u32>,
 
     /// Who answers the rays
     #[arg(long, value_name = "NAME", value_parser = backend(), help_heading = "Running")]
@@ -233,9 +181,142 @@ pub struct RenderArgs {
     /// All warnings, and more in the summary
     #[arg(short, long, help_heading = "Running")]
     pub verbose: bool,
+    /// Take warnings for errors: after one nothing is rendered
+    #[arg(long, help_heading = "Running")]
+    pub strict: bool,
     /// Write the summary as JSON; `-` is stdout
     #[arg(long, value_name = "FILE.json", help_heading = "Running")]
     pub stats: Option<PathBuf>,
+    /// Print what decides the picture, and whether a flag, the scene file or a default says so; render nothing
+    #[arg(long, conflicts_with_all = ["pixel", "stats"], help_heading = "Running")]
+    pub print_config: bool,
+}
+
+/// What decides the pixels, but for the camera. What is not given here the scene file may say;
+/// what neither says has a default.
+#[derive(Args, Clone, Debug, Default)]
+pub struct PictureArgs {
+    /// Curve from light to the bytes of 8-bit images; `stretch` is the range of the image onto 0 to 255,
+    /// without sRGB [default: none; stretch for .ray]
+    #[arg(long, value_name = "CURVE", value_parser = tonemap(), help_heading = "Output")]
+    pub tonemap: Option<Tonemap>,
+    /// Multiply the light in 8-bit images by two to this power
+    #[arg(
+        long, value_name = "EV", value_parser = parse::exposure, allow_negative_numbers = true,
+        help_heading = "Output"
+    )]
+    pub exposure: Option<f32>,
+
+    /// Pixels of the image [default: 1280x720]
+    #[arg(long, value_name = "WxH", value_parser = parse::size, help_heading = "Image")]
+    pub size: Option<(u64, u64)>,
+    /// Enlarge or shrink the size
+    #[arg(long, value_name = "P%", value_parser = parse::scale, allow_hyphen_values = true, help_heading = "Image")]
+    pub scale: Option<f64>,
+    /// Render this part only: pixels, or shares from 0 to 1 if there is a dot
+    #[arg(
+        long, value_name = "x0,y0,x1,y1", value_parser = parse::region, allow_hyphen_values = true,
+        help_heading = "Image"
+    )]
+    pub crop: Option<parse::Region>,
+    /// Trace one pixel and print its ray tree; no image
+    #[arg(
+        long, value_name = "x,y", value_parser = parse::pixel, allow_hyphen_values = true, help_heading = "Image",
+        conflicts_with_all = ["output", "aov", "crop", "turntable", "stats", "tonemap", "exposure"]
+    )]
+    pub pixel: Option<(u64, u64)>,
+
+    /// Most reflections and refractions in a row, up to 100000 [default: 8]
+    #[arg(
+        short, long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=100_000),
+        allow_negative_numbers = true, help_heading = "Quality"
+    )]
+    pub recursion: Option<u32>,
+    /// Samples per pixel [default: 1 for a mesh, 16 for a scene]
+    #[arg(
+        long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true,
+        help_heading = "Quality"
+    )]
+    pub spp: Option<u32>,
+    /// Chooses the samples: the same seed gives the same bytes [default: 0]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Quality")]
+    pub seed: Option<u32>,
+    /// Do not trace branches that weigh less; 0 traces the whole tree [default: 1/1024; 0 for .ray]
+    #[arg(
+        long, value_name = "W", value_parser = parse::weight, allow_negative_numbers = true,
+        help_heading = "Quality"
+    )]
+    pub min_weight: Option<f32>,
+    /// Shadow rays for each hit and each light that has a radius [default: 1; the scene's samples for .ray]
+    #[arg(
+        long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536),
+        allow_negative_numbers = true, help_heading = "Quality"
+    )]
+    pub light_samples: Option<u32>,
+    /// How points of the lens are drawn; polar-uniform-radius is the biased sampler of the 2011 report, which
+    /// takes too many in the middle [default: concentric]
+    #[arg(long, value_name = "NAME", value_parser = lens_sampler(), help_heading = "Quality")]
+    pub lens_sampler: Option<LensSampler>,
+    /// With one sample, take the exact centre of each pixel, not a point beside it
+    #[arg(long, help_heading = "Quality")]
+    pub centre: bool,
+}
+
+/// What of the camera is given. The rest is as the scene file has it, or chosen.
+#[derive(Args, Clone, Debug, Default)]
+pub struct CameraArgs {
+    /// Camera of the scene file [default: its first]; without one, or for a mesh, a view: three-quarter,
+    /// front, back, left, right, top, bottom [default: three-quarter]
+    #[arg(long = "camera", value_name = "NAME", help_heading = "Camera")]
+    pub name: Option<String>,
+    /// Where the camera is
+    #[arg(
+        long, value_name = "x,y,z", value_parser = parse::vector, allow_hyphen_values = true,
+        help_heading = "Camera"
+    )]
+    pub eye: Option<DVec3>,
+    /// What it looks at [default: the middle of the scene, if no camera says]
+    #[arg(
+        long, value_name = "x,y,z", value_parser = parse::vector, allow_hyphen_values = true,
+        help_heading = "Camera"
+    )]
+    pub target: Option<DVec3>,
+    /// Which way is up [default: 0,1,0]
+    #[arg(
+        long, value_name = "x,y,z", value_parser = parse::direction, allow_hyphen_values = true,
+        help_heading = "Camera"
+    )]
+    pub up: Option<DVec3>,
+    /// Perspective with this vertical field of view in degrees [default: 40]
+    #[arg(
+        long, value_name = "DEGREES", value_parser = parse::fov, allow_negative_numbers = true,
+        conflicts_with = "ortho", help_heading = "Camera"
+    )]
+    pub fov: Option<f64>,
+    /// Parallel projection of this height in the scene's units
+    #[arg(
+        long, value_name = "HEIGHT", value_parser = parse::length, allow_negative_numbers = true,
+        help_heading = "Camera"
+    )]
+    pub ortho: Option<f64>,
+    /// Radius of the lens in the scene's units; 0 is a pinhole
+    #[arg(
+        long, value_name = "RADIUS", value_parser = parse::radius, allow_negative_numbers = true,
+        help_heading = "Camera"
+    )]
+    pub aperture: Option<f64>,
+    /// Distance to what is sharp [default: that of the target]
+    #[arg(
+        long, value_name = "DISTANCE", value_parser = parse::length, allow_negative_numbers = true,
+        help_heading = "Camera"
+    )]
+    pub focus: Option<f64>,
+    /// Render N images from once around, named IMAGE-0001 and so on
+    #[arg(
+        long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000),
+        allow_negative_numbers = true, help_heading = "Camera"
+    )]
+    pub turntable: Option<u32>,
 }
 
 /// How progress is shown.
@@ -256,6 +337,16 @@ pub enum ProgressMode {
 fn aov() -> impl TypedValueParser<Value = Aov> {
     PossibleValuesParser::new(Aov::ALL.map(Aov::name))
         .map(|name| Aov::ALL.into_iter().find(|a| a.name() == name).expect("only their names are possible"))
+}
+
+fn tonemap() -> impl TypedValueParser<Value = Tonemap> {
+    PossibleValuesParser::new(Tonemap::ALL.map(Tonemap::name))
+        .map(|name| Tonemap::ALL.into_iter().find(|t| t.name() == name).expect("only their names are possible"))
+}
+
+fn lens_sampler() -> impl TypedValueParser<Value = LensSampler> {
+    PossibleValuesParser::new(LensSampler::ALL.map(LensSampler::name))
+        .map(|name| LensSampler::ALL.into_iter().find(|s| s.name() == name).expect("only their names are possible"))
 }
 
 /// Both names are known in every binary, so that one without Embree can say so.

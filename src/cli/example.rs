@@ -14,6 +14,8 @@ use tison::render::Control;
 use tison::scene::example;
 
 const NAMES: &str = "\
+scene  a first scene file with comments: a ball, a box, a cylinder, a floor, a lens and lights:
+       tison example scene -o scene.toml && tison scene.toml
 mesh   a closed, displaced sphere of radius about 1 with normals, as large as you like:
        tison example mesh --triangles 1000000 -o ball.obj
 ";
@@ -22,8 +24,24 @@ mesh   a closed, displaced sphere of radius about 1 with normals, as large as yo
 pub fn example(name: Option<&Example>, messages: &Messages) -> Result<Exit, Failure> {
     match name {
         None => output::print(NAMES.as_bytes()),
+        Some(Example::Scene { output }) => scene(output.as_deref(), messages),
         Some(Example::Mesh { triangles, output }) => mesh(*triangles, output, messages),
     }
+}
+
+/// A file is something to change: what somebody made of it is not replaced.
+fn scene(path: Option<&Path>, messages: &Messages) -> Result<Exit, Failure> {
+    let text = example::FIRST_SCENE;
+    let Some(path) = path.filter(|p| p.as_os_str() != "-") else { return output::print(text.as_bytes()) };
+    film::check_target(path)?;
+    let is_other = |old: Vec<u8>| old != text.as_bytes();
+    if !film::is_special_file(path) && std::fs::read(path).is_ok_and(is_other) {
+        let what = format!("cannot write {}: there is such a file already", path.display());
+        return Err(Failure::new(Exit::Output, what).help("name another one, or remove it first"));
+    }
+    let size = film::save(path, |out| out.write_all(text.as_bytes()))?;
+    messages.line(&format!("wrote     {} ({})", path.display(), bytes(size)));
+    Ok(Exit::Done)
 }
 
 fn mesh(triangles: u64, path: &Path, messages: &Messages) -> Result<Exit, Failure> {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use tison::film::SaveError;
 use tison::scene;
+use tison::scene::format::Diagnostic;
 
 /// Exit codes. Scripts rely on them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,16 +46,27 @@ pub struct Failure {
     pub what: String,
     /// What to do.
     pub help: Option<String>,
-    /// The place in a file: path, line and column from 1.
-    pub place: Option<(PathBuf, u64, u64)>,
+    /// Where in a file.
+    pub place: Place,
     /// The error behind it, which may have others behind it.
     pub cause: Option<Box<dyn Error + Send + Sync>>,
+}
+
+/// Where in a file something is wrong.
+#[derive(Debug)]
+pub enum Place {
+    /// In none, or nobody knows.
+    Unknown,
+    /// A path, and line and column from 1.
+    Text(PathBuf, u64, u64),
+    /// Mistakes in a scene file, which say themselves what and where.
+    Scene(Vec<Diagnostic>),
 }
 
 impl Failure {
     /// A failure that says `what`.
     pub fn new(exit: Exit, what: impl Into<String>) -> Self {
-        Self { exit, what: what.into(), help: None, place: None, cause: None }
+        Self { exit, what: what.into(), help: None, place: Place::Unknown, cause: None }
     }
 
     /// Wrong usage.
@@ -94,7 +106,8 @@ impl From<scene::Error> for Failure {
             scene::Error::Read { path, source } => {
                 Self { help: super::message::nearest_input(&path), ..failure.because(source) }
             }
-            scene::Error::At { path, line, column, .. } => Self { place: Some((path, line, column)), ..failure },
+            scene::Error::Scene(list) => Self { place: Place::Scene(list), ..failure },
+            scene::Error::At { path, line, column, .. } => Self { place: Place::Text(path, line, column), ..failure },
             _ => failure,
         }
     }

@@ -1,27 +1,27 @@
 //! What is refused before anything is read or allocated.
 
 use super::exit::{Exit, Failure};
-use super::plan::Plan;
+use super::frame::Frame;
 use super::style::bytes;
 use super::system;
-use tison::film::Film;
+use tison::film::{Aov, Film};
 
 /// Longest side of what is rendered at once: what the header of a JPEG can state.
 pub const MAX_SIDE: u64 = 65_535;
 
 /// Refuses images that are too large for tison or for this machine's free memory.
-pub fn check(plan: &Plan) -> Result<(), Failure> {
-    if plan.pixel.is_some() {
+pub fn check(frame: &Frame, aovs: &[Aov]) -> Result<(), Failure> {
+    if frame.pixel.is_some() {
         return Ok(());
     }
-    let crop = plan.job.crop;
+    let crop = frame.crop;
     let (width, height) = (u64::from(crop.x1 - crop.x0), u64::from(crop.y1 - crop.y0));
-    refuse(width, height, memory_needed(width, height, plan), system::available_memory())
+    refuse(width, height, memory_needed(width, height, aovs), system::available_memory())
 }
 
 /// The film, and as much again for the encoder's copy of it.
-fn memory_needed(width: u64, height: u64, plan: &Plan) -> u64 {
-    Film::bytes(width, height, &plan.job.aovs).saturating_mul(2)
+fn memory_needed(width: u64, height: u64, aovs: &[Aov]) -> u64 {
+    Film::bytes(width, height, aovs).saturating_mul(2)
 }
 
 fn refuse(width: u64, height: u64, needed: u64, available: Option<u64>) -> Result<(), Failure> {

@@ -2,8 +2,9 @@
 
 use super::VERSION;
 use super::args::Cli;
-use super::exit::Failure;
-use super::style::Style;
+use super::exit::{Exit, Failure, Place};
+use super::notice::Notice;
+use super::style::{Style, counted};
 use clap::CommandFactory;
 use std::error::Error;
 use std::fs::File;
@@ -30,16 +31,34 @@ impl Messages {
         let _ = writeln!(io::stderr().lock(), "{text}");
     }
 
+    /// The first few notices as warnings, or all; `more` says how to see the others.
+    pub fn warnings(&self, notices: &[Notice], all: bool, more: &str) {
+        let (shown, hidden) = notices.split_at(if all { notices.len() } else { notices.len().min(FEW) });
+        shown.iter().for_each(|n| self.line(&n.told(false, self.style)));
+        if !hidden.is_empty() {
+            self.warning(&format!("and {} more ({more})", hidden.len()));
+        }
+    }
+
+    /// All notices, as the errors that `--strict` makes of them.
+    pub fn strict(&self, notices: &[Notice]) -> Result<(), Failure> {
+        notices.iter().for_each(|n| self.line(&n.told(true, self.style)));
+        match notices.len() as u64 {
+            0 => Ok(()),
+            n => {
+                let what = format!(
+                    "{}, which --strict takes for {}",
+                    counted(n, "warning"),
+                    if n == 1 { "an error" } else { "errors" }
+                );
+                Err(Failure::new(Exit::Input, what))
+            }
+        }
+    }
+
     /// One warning.
     pub fn warning(&self, text: &str) {
         self.line(&format!("{} {text}", self.style.warning("warning:")));
-    }
-
-    /// The first few warnings, or all; `more` says how to see the others.
-    pub fn warnings(&self, texts: &[impl ToString], all: bool, more: &str) {
-        for text in chosen(texts, all, more) {
-            self.warning(&text);
-        }
     }
 
     /// Why the run did not end well.
@@ -48,22 +67,15 @@ impl Messages {
     }
 }
 
-fn chosen(texts: &[impl ToString], all: bool, more: &str) -> Vec<String> {
-    let shown = if all { texts.len() } else { texts.len().min(FEW) };
-    let mut chosen: Vec<String> = texts[..shown].iter().map(ToString::to_string).collect();
-    if shown < texts.len() {
-        chosen.push(format!("and {} more ({more})", texts.len() - shown));
-    }
-    chosen
-}
-
 fn describe(failure: &Failure, style: Style) -> String {
     let mut out = format!("{} {}", style.error("error:"), failure.what);
-    let excerpt = failure.place.as_ref().and_then(|(path, line, column)| {
-        let text = source_line(path, *line)?;
-        Some(excerpt(&text, *line, *column, style))
-    });
-    out.extend(excerpt);
+    match &failure.place {
+        Place::Unknown => {}
+        Place::Text(path, line, column) => {
+            out.extend(source_line(path, *line).map(|text| excerpt(&text, *line, *column, style)));
+        }
+        Place::Scene(list) => out = list.iter().map(|d| d.render(style.look())).collect::<Vec<_>>().join("\n\n"),
+    }
     let mut cause = failure.cause.as_deref().map(|e| e as &dyn Error);
     while let Some(e) = cause {
         out += &format!("\n  caused by: {e}");
@@ -181,7 +193,6 @@ fn edits(a: &str, b: &str) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::exit::Exit;
     use super::*;
 
     #[test]
@@ -195,20 +206,12 @@ mod tests {
     }
 
     #[test]
-    fn only_some_of_many_warnings_unless_asked_for() {
-        let many = ["a", "b", "c", "d", "e", "f", "g"];
-        assert_eq!(chosen(&many, true, "").len(), 7);
-        assert_eq!(chosen(&many[..5], false, "-v shows all"), ["a", "b", "c", "d", "e"]);
-        assert_eq!(chosen(&many, false, "-v shows all")[4..], ["e", "and 2 more (-v shows all)"]);
-    }
-
-    #[test]
     fn a_place_is_shown_with_a_caret() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.obj");
         std::fs::write(&path, "v 0 0 0\nf\t1 2 x9\r\n").unwrap();
         let failure = Failure {
-            place: Some((path, 2, 7)),
+            place: Place::Text(path, 2, 7),
             ..Failure::new(Exit::Input, "a.obj:2:7: not an index").help("fix it")
         };
         let text = describe(&failure, Style::of_stderr());
@@ -217,8 +220,8 @@ mod tests {
 
     #[test]
     fn a_place_that_is_not_there_is_left_out() {
-        for place in [(PathBuf::from("/no/such/file"), 1, 1), (PathBuf::from("/dev/zero"), 3, 1)] {
-            let failure = Failure { place: Some(place), ..Failure::new(Exit::Input, "gone") };
+        for (path, line) in [("/no/such/file", 1), ("/dev/zero", 3)] {
+            let failure = Failure { place: Place::Text(path.into(), line, 1), ..Failure::new(Exit::Input, "gone") };
             assert_eq!(describe(&failure, Style::of_stderr()), "error: gone");
         }
     }

@@ -4,21 +4,27 @@
 //! stdout carries only what was asked for; everything else is on stderr.
 
 mod args;
+mod camera;
+mod config;
 mod example;
 mod exit;
+mod frame;
 mod info;
 mod limits;
 mod message;
+mod notice;
 mod output;
 mod parse;
 mod plan;
 mod progress;
 mod render;
 mod report;
+mod settings;
 mod signals;
 mod stats;
 mod style;
 mod system;
+mod target;
 mod turntable;
 
 use args::{Cli, Command};
@@ -66,7 +72,7 @@ fn run(cli: Cli) -> Exit {
         None => plan::Plan::new(&cli.render).and_then(|plan| render::render(&plan, &messages)),
         Some(Command::Render(args)) => plan::Plan::new(&args).and_then(|plan| render::render(&plan, &messages)),
         Some(Command::Info(args)) => info::info(&args, &messages),
-        Some(Command::Check { file }) => info::check(&file, &messages),
+        Some(Command::Check(args)) => info::check(&args, &messages),
         Some(Command::Example { name }) => example::example(name.as_ref(), &messages),
         Some(Command::Completions { shell }) => output::print_with(|out| {
             clap_complete::generate(shell, &mut Cli::command(), "tison", out);

@@ -99,6 +99,20 @@ pub fn weight(s: &str) -> Result<f32, String> {
     if (0.0..=1.0).contains(&v) { Ok(v as f32) } else { Err("expected a weight from 0 to 1".into()) }
 }
 
+/// Powers of two that floats can hold, with room to multiply.
+pub fn exposure(s: &str) -> Result<f32, String> {
+    let v = finite(s)?;
+    if v.abs() <= 64.0 { Ok(v as f32) } else { Err("expected an exposure from -64 to 64".into()) }
+}
+
+/// `path.to.key=value`; the scene file's reader says whether there is such a key.
+pub fn define(s: &str) -> Result<String, String> {
+    match s.split_once('=') {
+        Some((key, _)) if !key.trim().is_empty() => Ok(s.to_owned()),
+        _ => Err("expected path.to.key=value, like render.samples=4".into()),
+    }
+}
+
 fn finite(s: &str) -> Result<f64, String> {
     match s.parse::<f64>() {
         Ok(v) if v.is_finite() => Ok(v),
@@ -188,6 +202,10 @@ mod tests {
         assert!(radius("0").is_ok() && radius("-0.1").is_err());
         assert_eq!(weight("0.0009765625"), Ok(1.0 / 1024.0));
         assert!(weight("1.1").is_err() && weight("nan").is_err());
+        assert_eq!(exposure("-1.5"), Ok(-1.5));
+        assert!(exposure("64").is_ok() && exposure("65").is_err() && exposure("nan").is_err());
+        assert!(define("a.b=1").is_ok() && define("a.b=").is_ok());
+        assert!(define("a.b").is_err() && define("=1").is_err() && define("").is_err());
         assert_eq!(pixel("3,4"), Ok((3, 4)));
         assert!(pixel("3").is_err() && pixel("-1,0").is_err());
     }

@@ -1,42 +1,43 @@
 //! What a run will do: the flags, checked together. All that can be refused without
-//! reading the scene is refused here.
+//! reading the scene is refused here; what the scene file may say is settled by `settings`.
 
-use super::args::{ProgressMode, RenderArgs};
-use super::exit::{Exit, Failure};
-use super::limits::MAX_SIDE;
-use super::message::nearest;
-use super::parse::Region;
-use super::turntable;
+use super::args::{CameraArgs, PictureArgs, ProgressMode, ReadingArgs, RenderArgs};
+use super::exit::Failure;
+use super::frame::Frame;
+use super::settings::{SIZE, Setting, Settings};
+use super::target::{Output, Target, outputs};
+use super::{camera, config, turntable};
 use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use tison::backend::BackendKind;
-use tison::film::{self, Format};
-use tison::render::{Crop, Job};
-use tison::scene::desc::LensSampler;
-use tison::scene::{CameraOverrides, Projection, View};
+use tison::film::{self, Aov};
+use tison::scene::desc::RenderDesc;
+use tison::scene::format;
 
 /// A render, as it will be done.
 #[derive(Debug)]
 pub struct Plan {
-    /// The mesh.
+    /// The scene or mesh.
     pub input: PathBuf,
+    /// Which of the two it is.
+    pub kind: Input,
     /// Crease angle in degrees.
     pub smooth: Option<f64>,
-    /// The image.
-    pub job: Job,
-    /// Where to look from when no eye is given.
-    pub view: View,
+    /// Keys of the scene file set by `-D`.
+    pub defines: Vec<String>,
+    /// Folders that the file may name others in.
+    pub allow: Vec<PathBuf>,
+    /// What of the picture is given.
+    pub picture: PictureArgs,
     /// What of the camera is given.
-    pub camera: CameraOverrides,
-    /// Images once around; none: a single image with its name as it is.
-    pub turntable: Option<u32>,
+    pub camera: CameraArgs,
+    /// Auxiliary images, each once.
+    pub aovs: Vec<Aov>,
     /// Who answers the rays.
     pub backend: BackendKind,
     /// Threads to work with.
     pub threads: usize,
-    /// Tell about this pixel only.
-    pub pixel: Option<(u32, u32)>,
     /// Where the image goes.
     pub outputs: Vec<Output>,
     /// Where the figures go.
@@ -47,72 +48,107 @@ pub struct Plan {
     pub quiet: bool,
     /// More of both.
     pub verbose: bool,
+    /// A warning is an error.
+    pub strict: bool,
+    /// Print the settings, render nothing.
+    pub print_config: bool,
+    /// The flags above, with who says so.
+    pub list: Vec<Setting>,
 }
 
-/// A file or stdout.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Target {
-    Stdout,
-    File(PathBuf),
+/// What kind of file is rendered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Input {
+    /// A bare mesh, to be framed and lit.
+    Mesh,
+    /// A scene file, which says all that itself.
+    Scene,
 }
 
-/// An image file of the run.
-#[derive(Clone, Debug)]
-pub struct Output {
-    pub target: Target,
-    pub format: Format,
+impl Input {
+    /// By the end of the file's name.
+    pub fn of(path: &Path) -> Self {
+        if format::Format::of(path).is_some() { Self::Scene } else { Self::Mesh }
+    }
+
+    /// Refuses to set keys of a mesh, and to allow what is no folder.
+    pub fn check_reading(self, reading: &ReadingArgs, path: &Path) -> Result<(), Failure> {
+        if self == Self::Mesh && !reading.define.is_empty() {
+            let what = format!("-D sets keys of a scene file, and {} is none", path.display());
+            return Err(Failure::usage(what).help("use the flags of tison render --help for a mesh"));
+        }
+        match reading.allow_path.iter().find(|dir| !dir.is_dir()) {
+            Some(dir) => Err(Failure::usage(format!("--allow-path {}: there is no such folder", dir.display()))),
+            None => Ok(()),
+        }
+    }
 }
 
-/// Names of the views of a mesh.
-const VIEWS: [(&str, View); 7] = [
-    ("three-quarter", View::ThreeQuarter),
-    ("front", View::Front),
-    ("back", View::Back),
-    ("left", View::Left),
-    ("right", View::Right),
-    ("top", View::Top),
-    ("bottom", View::Bottom),
-];
+const ANOTHER_NAME: &str = "name another file with -o, or with --stats";
 
 impl Plan {
     /// Checks the flags together.
     pub fn new(args: &RenderArgs) -> Result<Self, Failure> {
         let input = args.input.clone().ok_or_else(|| Failure::usage("no file to render was given"))?;
-        let backend = backend(args.backend)?;
-        let job = job(args)?;
+        let kind = Input::of(&input);
+        kind.check_reading(&args.reading, &input)?;
         let outputs = outputs(args, &input)?;
         let stats = args.stats.clone().map(Target::of);
         if stats == Some(Target::Stdout) && outputs.iter().any(|o| o.target == Target::Stdout) {
             return Err(Failure::usage("the image and the figures cannot both go to stdout")
                 .help("name a file for one of them: -o IMAGE.png or --stats FILE.json"));
         }
-        let pixel = args.pixel.map(|p| inside(p, job.size)).transpose()?;
-        let plan = Self {
+        let mut plan = Self {
+            kind,
             smooth: args.smooth,
-            view: view(args.camera.as_deref())?,
-            camera: camera(args),
-            turntable: args.turntable,
+            defines: args.reading.define.clone(),
+            allow: args.reading.allow_path.clone(),
+            picture: args.picture.clone(),
+            camera: args.camera.clone(),
+            aovs: each_once(&args.aov),
             threads: args.threads.map_or_else(all_threads, usize::from),
             progress: if args.quiet { ProgressMode::None } else { args.progress },
             quiet: args.quiet,
             verbose: args.verbose,
+            strict: args.strict,
+            print_config: args.print_config,
+            backend: backend(args.backend)?,
             input,
-            backend,
-            job,
             outputs,
             stats,
-            pixel,
+            list: Vec::new(),
         };
+        plan.list = config::of_run(args, &plan);
         plan.refuse_overwriting()?;
+        plan.refuse_what_no_scene_can_mend()?;
         Ok(plan)
+    }
+
+    /// The image, if its size is known before the file is read.
+    pub fn known_frame(&self) -> Result<Option<Frame>, Failure> {
+        let size = match self.kind {
+            Input::Mesh => Some(self.picture.size.unwrap_or(SIZE)),
+            Input::Scene => self.picture.size,
+        };
+        size.map(|size| Frame::new(&self.picture, size)).transpose()
+    }
+
+    fn refuse_what_no_scene_can_mend(&self) -> Result<(), Failure> {
+        self.known_frame()?;
+        if self.kind == Input::Mesh {
+            Settings::new(self, &RenderDesc::default())?;
+            camera::view(&self.camera)?;
+            camera::check_focus(&self.camera, 0.0)?;
+        }
+        Ok(())
     }
 
     /// Every file that the run will write, of the first frame at least.
     pub fn files(&self) -> Vec<PathBuf> {
         let images = self.outputs.iter().filter_map(|o| match &o.target {
             Target::File(path) => {
-                let path = self.turntable.map_or_else(|| path.clone(), |_| turntable::frame_path(path, 0));
-                Some(film::files(&path, o.format, &self.job.aovs))
+                let path = self.camera.turntable.map_or_else(|| path.clone(), |_| turntable::frame_path(path, 0));
+                Some(film::files(&path, o.format, &self.aovs))
             }
             Target::Stdout => None,
         });
@@ -131,25 +167,31 @@ impl Plan {
         Ok(())
     }
 
+    /// What was read for the scene stays as it is too.
+    pub fn check_read(&self, read: &[PathBuf]) -> Result<(), Failure> {
+        let written = self.files();
+        match written.iter().find(|file| read.iter().any(|r| same_file(file, r))) {
+            Some(file) => {
+                let what = format!("{} is read for the scene: it would be overwritten", file.display());
+                Err(Failure::usage(what).help(ANOTHER_NAME))
+            }
+            None => Ok(()),
+        }
+    }
+
     /// The input stays as it is, and no file is written twice.
     fn refuse_overwriting(&self) -> Result<(), Failure> {
         let files = self.files();
         for (i, file) in files.iter().enumerate() {
             if same_file(file, &self.input) {
                 let what = format!("{} is the input: it would be overwritten", file.display());
-                return Err(Failure::usage(what).help("name another file with -o"));
+                return Err(Failure::usage(what).help(ANOTHER_NAME));
             }
             if files[..i].iter().any(|f| f == file || (same_file(f, file) && !film::is_special_file(f))) {
                 return Err(Failure::usage(format!("{} would be written twice", file.display())));
             }
         }
         Ok(())
-    }
-}
-
-impl Target {
-    fn of(path: PathBuf) -> Self {
-        if path.as_os_str() == "-" { Self::Stdout } else { Self::File(path) }
     }
 }
 
@@ -166,165 +208,14 @@ fn all_threads() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-fn job(args: &RenderArgs) -> Result<Job, Failure> {
-    if args.centre && args.spp > 1 {
-        return Err(Failure::usage(format!("--centre is for one sample a pixel, not for --spp {}", args.spp))
-            .help("several samples are spread over the pixel in any case"));
-    }
-    let size = size(args)?;
-    let mut aovs = args.aov.clone();
-    let mut seen = Vec::new();
-    aovs.retain(|a| {
-        !seen.contains(a) && {
-            seen.push(*a);
-            true
-        }
-    });
-    Ok(Job {
-        size,
-        crop: crop(args.crop, size)?,
-        spp: args.spp,
-        seed: args.seed,
-        k_max: args.recursion,
-        min_weight: args.min_weight,
-        centre: args.centre,
-        lens_sampler: LensSampler::default(),
-        jitter_radius: 0.5,
-        light_samples: 1,
-        aovs,
-    })
-}
-
-/// Sides beyond what any image may have are refused here, because they may not even fit a `u32`.
-fn size(args: &RenderArgs) -> Result<(u32, u32), Failure> {
-    /// Largest whole image, of which parts may be rendered.
-    const MAX_WHOLE: f64 = 1e9;
-    let scale = args.scale.unwrap_or(1.0);
-    let scaled = |side: u64| (side as f64 * scale).round().max(1.0);
-    let (w, h) = (scaled(args.size.0), scaled(args.size.1));
-    if w > MAX_WHOLE || h > MAX_WHOLE {
-        let what = format!("an image of {w}x{h} pixels is larger than tison can count");
-        return Err(
-            Failure::new(Exit::Limit, what).help(format!("choose a --size of at most {MAX_SIDE} pixels a side"))
-        );
-    }
-    Ok((w as u32, h as u32))
-}
-
-fn crop(region: Option<Region>, (width, height): (u32, u32)) -> Result<Crop, Failure> {
-    let whole = Crop { x0: 0, y0: 0, x1: width, y1: height };
-    let sides = [width, height, width, height];
-    let edges = match region {
-        None => return Ok(whole),
-        Some(Region::Pixels(edges)) => edges,
-        // Rounded the same way on both sides, so that neighbouring parts meet without gap or overlap.
-        Some(Region::Shares(shares)) => std::array::from_fn(|i| (shares[i] * f64::from(sides[i])).round() as u64),
-    };
-    if edges[2] > u64::from(width) || edges[3] > u64::from(height) {
-        return Err(Failure::usage(format!("--crop reaches beyond the image, which has {width}x{height} pixels")));
-    }
-    let [x0, y0, x1, y1] = edges.map(|e| e as u32);
-    if x0 >= x1 || y0 >= y1 {
-        return Err(Failure::usage(format!("--crop holds no pixel of an image of {width}x{height}")));
-    }
-    Ok(Crop { x0, y0, x1, y1 })
-}
-
-fn inside((x, y): (u64, u64), (width, height): (u32, u32)) -> Result<(u32, u32), Failure> {
-    if x < u64::from(width) && y < u64::from(height) {
-        Ok((x as u32, y as u32))
-    } else {
-        let what = format!("pixel {x},{y} is outside the image, which has {width}x{height} pixels counted from 0");
-        Err(Failure::usage(what))
-    }
-}
-
-fn view(name: Option<&str>) -> Result<View, Failure> {
-    let Some(name) = name else { return Ok(View::ThreeQuarter) };
-    if let Some((_, view)) = VIEWS.iter().find(|(n, _)| *n == name) {
-        return Ok(*view);
-    }
-    let names = VIEWS.map(|(n, _)| n);
-    let failure = Failure::usage(format!("no camera is called '{name}': a mesh has the views {}", names.join(", ")));
-    Err(match nearest(name, names) {
-        Some(near) => failure.help(format!("did you mean '{near}'?")),
-        None => failure,
-    })
-}
-
-fn camera(args: &RenderArgs) -> CameraOverrides {
-    let perspective = args.fov.map(|fov_deg| Projection::Perspective { fov_deg });
-    let parallel = args.ortho.map(|height| Projection::Orthographic { height });
-    CameraOverrides {
-        eye: args.eye,
-        target: args.target,
-        up: args.up,
-        projection: perspective.or(parallel),
-        aperture: args.aperture,
-        focus: args.focus,
-    }
-}
-
-fn outputs(args: &RenderArgs, input: &Path) -> Result<Vec<Output>, Failure> {
-    if args.pixel.is_some() {
-        return Ok(Vec::new());
-    }
-    let named: Vec<PathBuf> = if args.output.is_empty() {
-        let stem = input.file_stem().ok_or_else(|| {
-            Failure::usage(format!("{} names no file", input.display())).help("name a mesh like model.obj")
-        })?;
-        let mut name = stem.to_owned();
-        name.push(".png");
-        vec![name.into()]
-    } else {
-        args.output.clone()
-    };
-    let outputs: Vec<Output> = named.into_iter().map(output).collect::<Result<_, _>>()?;
-    for output in &outputs {
-        check_output(output, args)?;
-    }
-    if outputs.iter().filter(|o| o.target == Target::Stdout).count() > 1 {
-        return Err(Failure::usage("-o - is given twice, but there is one stdout"));
-    }
-    Ok(outputs)
-}
-
-fn output(path: PathBuf) -> Result<Output, Failure> {
-    let format = match Format::of(&path) {
-        Some(format) => format,
-        // A pipe or device has no use for an extension.
-        None if path.as_os_str() == "-" || film::is_special_file(&path) => Format::Png,
-        // Whatever else is wrong with its name.
-        None if path.is_dir() => return Err(film::SaveError::IsFolder { path }.into()),
-        None => return Err(unknown_format(&path)),
-    };
-    Ok(Output { target: Target::of(path), format })
-}
-
-fn unknown_format(path: &Path) -> Failure {
-    let known = Format::EXTENSIONS;
-    let extension = path.extension().map(|e| e.to_string_lossy().into_owned());
-    let what = match &extension {
-        Some(e) => format!("{}: '.{e}' is no image format that tison writes", path.display()),
-        None => format!("{} has no extension to tell the image format by", path.display()),
-    };
-    let near = extension.and_then(|e| nearest(&e, known.split(", ")).map(str::to_owned));
-    Failure::usage(what).help(match near {
-        Some(near) => format!("did you mean .{near}? There are {known}"),
-        None => format!("use one of {known}"),
-    })
-}
-
-/// What one output cannot be, given the rest.
-fn check_output(output: &Output, args: &RenderArgs) -> Result<(), Failure> {
-    if output.target == Target::Stdout {
-        let several = if args.turntable.is_some() { "--turntable" } else { "--aov" };
-        if args.turntable.is_some() || !args.aov.is_empty() {
-            return Err(Failure::usage(format!("{several} makes several files, which do not fit on stdout"))
-                .help("name a file with -o"));
+fn each_once(aovs: &[Aov]) -> Vec<Aov> {
+    let mut once = Vec::new();
+    for aov in aovs {
+        if !once.contains(aov) {
+            once.push(*aov);
         }
     }
-    Ok(())
+    once
 }
 
 /// Whether both names lead to one file that exists.
@@ -336,4 +227,4 @@ fn same_file(a: &Path, b: &Path) -> bool {
 }
 
 #[cfg(test)]
-mod tests;
+pub mod tests;

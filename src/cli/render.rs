@@ -1,26 +1,36 @@
 //! The run: read, build, render, write.
 
+use super::camera::{self, Chosen};
 use super::exit::{Exit, Failure};
+use super::frame::Frame;
 use super::message::Messages;
-use super::plan::{Output, Plan, Target};
+use super::notice::Notice;
+use super::plan::{Input, Plan};
 use super::progress::{Progress, Stage};
 use super::report::Report;
+use super::settings::Settings;
 use super::signals::Signals;
-use super::{EMBREE, VERSION, limits, output, turntable};
+use super::target::{Output, Target};
+use super::{EMBREE, VERSION, config, limits, output, turntable};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 use tison::backend::{self, AnyBackend, BuildOptions};
-use tison::film::{self, Film, Notes};
-use tison::render::{self, Control, RenderStats};
-use tison::scene::{self, CameraDesc, LoadOptions, Loaded, Scene};
+use tison::film::{self, Display, Film, Notes, Tonemap};
+use tison::render::{self, Control, Job, RenderStats};
+use tison::scene::format::Override;
+use tison::scene::{self, CameraDesc, Light, LoadOptions, Loaded, Scene};
 
 /// Does what the plan says.
 pub fn render(plan: &Plan, messages: &Messages) -> Result<Exit, Failure> {
     let started = Instant::now();
-    limits::check(plan)?;
-    plan.check_targets()?;
+    if !plan.print_config {
+        if let Some(frame) = plan.known_frame()? {
+            limits::check(&frame, &plan.aovs)?;
+        }
+        plan.check_targets()?;
+    }
     let control = Arc::new(Control::default());
     let signals =
         Signals::install(&control).map_err(|e| Failure::new(Exit::Internal, "cannot listen for signals").because(e))?;
@@ -29,7 +39,11 @@ pub fn render(plan: &Plan, messages: &Messages) -> Result<Exit, Failure> {
         .build()
         .map_err(|e| Failure::new(Exit::Render, format!("cannot start {} threads", plan.threads)).because(e))?;
     let run = Run { plan, messages, control: &control, progress: Progress::start(plan.progress, &control) };
-    let done = pool.install(|| if plan.pixel.is_some() { run.pixel() } else { run.images(started) });
+    let done = pool.install(|| match plan.picture.pixel {
+        _ if plan.print_config => run.config(),
+        Some(_) => run.pixel(),
+        None => run.images(started),
+    });
     match (done, signals.caught()) {
         (Ok(exit), None) => Ok(exit),
         // Whatever failed after a signal failed because of it, but for what the disk had to say.
@@ -51,7 +65,9 @@ struct Run<'a> {
 /// Seconds of each stage.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Seconds {
+    /// Without the textures.
     pub read: f64,
+    pub textures: f64,
     pub build: f64,
     pub render: f64,
     pub write: f64,
@@ -71,23 +87,33 @@ pub struct Done {
     pub warnings: usize,
 }
 
+/// A scene that has been read, and how it is to be rendered.
+#[derive(Debug)]
+pub struct Ready {
+    pub loaded: Loaded,
+    pub settings: Settings,
+    pub chosen: Chosen,
+    /// Warnings, which have been shown.
+    pub warnings: usize,
+}
+
 impl Run<'_> {
     fn images(self, started: Instant) -> Result<Exit, Failure> {
         let mut done = Done::default();
-        let (mut scene, warnings) = timed(&mut done.seconds.read, || self.read())?;
-        done.warnings = warnings;
-        let first = self.camera(&scene)?;
-        let unlit = scene.lights.is_empty();
-        if unlit {
-            scene.light_from(&first);
-        }
-        let backend = timed(&mut done.seconds.build, || self.build(&scene))?;
-        for frame in 0..self.plan.turntable.unwrap_or(1) {
-            let camera = self.frame_camera(&first, frame);
-            if unlit {
-                scene.light_from(&camera);
-            }
-            self.frame(frame, &camera, &scene, &backend, &mut done)?;
+        let mut ready = timed(&mut done.seconds.read, || self.read())?;
+        let frame = Frame { size: ready.settings.job.size, crop: ready.settings.job.crop, pixel: None };
+        limits::check(&frame, &self.plan.aovs)?;
+        self.plan.check_read(&ready.loaded.files)?;
+        done.warnings = ready.warnings;
+        done.seconds.textures = ready.loaded.texture_seconds.min(done.seconds.read);
+        done.seconds.read -= done.seconds.textures;
+        let first = ready.chosen.camera;
+        self.light(&mut ready.loaded.scene, &first);
+        let backend = timed(&mut done.seconds.build, || self.build(&ready.loaded.scene, &ready.settings.job))?;
+        for frame in 0..self.plan.camera.turntable.unwrap_or(1) {
+            let camera = self.frame_camera(&ready.chosen, frame);
+            self.light(&mut ready.loaded.scene, &camera);
+            self.frame(frame, &camera, &ready, &backend, &mut done)?;
             if self.control.is_cancelled() {
                 break;
             }
@@ -96,7 +122,7 @@ impl Run<'_> {
             return Err(Failure::new(Exit::Render, STOPPED));
         }
         done.seconds.total = started.elapsed().as_secs_f64();
-        let report = Report::new(self.plan, &scene, &backend, &first, done);
+        let report = Report::new(self.plan, &ready, &backend, done);
         let messages = self.messages;
         drop(self);
         report.tell(messages)?;
@@ -108,12 +134,12 @@ impl Run<'_> {
         &self,
         frame: u32,
         camera: &CameraDesc,
-        scene: &Scene,
+        ready: &Ready,
         backend: &AnyBackend,
         done: &mut Done,
     ) -> Result<(), Failure> {
         self.progress.stage(Stage::Render);
-        let outcome = render::run(scene, camera, backend, &self.plan.job, self.control)
+        let outcome = render::run(&ready.loaded.scene, camera, backend, &ready.settings.job, self.control)
             .map_err(|e| Failure::new(Exit::Usage, e))?;
         done.seconds.render += outcome.stats.seconds;
         merge(&mut done.stats, &outcome.stats, frame);
@@ -122,62 +148,77 @@ impl Run<'_> {
             return Ok(());
         }
         self.progress.stage(Stage::Write);
-        timed(&mut done.seconds.write, || self.save(&outcome.film, backend, frame, &mut done.written))
+        let display = Display { depth_range: camera.clip, ..ready.settings.display };
+        timed(&mut done.seconds.write, || {
+            let notes = notes(self.plan, &ready.settings, backend);
+            self.save(&outcome.film, frame, &display, &notes, &mut done.written)
+        })
     }
 
     fn pixel(self) -> Result<Exit, Failure> {
-        let (x, y) = self.plan.pixel.expect("asked before");
-        let (mut scene, _) = self.read()?;
-        let camera = self.camera(&scene)?;
-        if scene.lights.is_empty() {
-            scene.light_from(&camera);
-        }
-        let backend = self.build(&scene)?;
-        let tree = render::explain_pixel(&scene, &camera, &backend, &self.plan.job, x, y)
+        let mut ready = self.read()?;
+        let (x, y) = ready.settings.pixel.expect("asked before");
+        let camera = ready.chosen.camera;
+        self.light(&mut ready.loaded.scene, &camera);
+        let job = &ready.settings.job;
+        let backend = self.build(&ready.loaded.scene, job)?;
+        let tree = render::explain_pixel(&ready.loaded.scene, &camera, &backend, job, x, y)
             .map_err(|e| Failure::new(Exit::Usage, e))?;
         drop(self);
         output::print(tree.as_bytes())
     }
 
-    /// The scene and the number of warnings about it, which have been shown.
-    fn read(&self) -> Result<(Scene, usize), Failure> {
+    fn config(self) -> Result<Exit, Failure> {
+        let mut ready = self.read()?;
+        self.light(&mut ready.loaded.scene, &ready.chosen.camera);
+        let text = config::text(self.plan, &ready);
+        drop(self);
+        output::print(text.as_bytes())
+    }
+
+    /// Reads the scene, settles what it leaves open, and shows the warnings.
+    fn read(&self) -> Result<Ready, Failure> {
+        let plan = self.plan;
         self.progress.stage(Stage::Read);
-        let loaded = load(&self.plan.input, self.plan.smooth, self.control, &self.progress)?;
-        if !self.plan.quiet {
-            let all = self.plan.verbose;
-            self.progress.aside(|| self.messages.warnings(&loaded.warnings, all, "-v shows all"));
-        }
-        Ok((loaded.scene, loaded.warnings.len()))
+        let reading = Reading { smooth: plan.smooth, allow: &plan.allow, defines: &plan.defines };
+        let loaded = load(&plan.input, &reading, self.control, &self.progress)?;
+        let mut notices = Notice::about(&loaded);
+        let settings = Settings::new(plan, &loaded.render)?;
+        let chosen = camera::choose(plan, &loaded, &settings)?;
+        notices.extend(Notice::about_picture(&settings.job, &chosen.camera));
+        let mut strict = Ok(());
+        self.progress.aside(|| match (plan.strict, plan.quiet) {
+            (true, _) => strict = self.messages.strict(&notices),
+            (false, true) => {}
+            (false, false) => self.messages.warnings(&notices, plan.verbose, "-v shows all"),
+        });
+        strict.map(|()| Ready { loaded, settings, chosen, warnings: notices.len() })
     }
 
-    fn camera(&self, scene: &Scene) -> Result<CameraDesc, Failure> {
-        let (width, height) = self.plan.job.size;
-        let aspect = f64::from(width) / f64::from(height);
-        let camera =
-            scene.auto_camera(self.plan.view, &self.plan.camera, aspect).map_err(|e| Failure::new(Exit::Usage, e))?;
-        Ok(match self.plan.turntable {
-            Some(_) => turntable::first(&camera, &self.plan.camera, scene.bounds(), aspect),
-            None => camera,
-        })
-    }
-
-    fn frame_camera(&self, first: &CameraDesc, frame: u32) -> CameraDesc {
-        match self.plan.turntable {
-            Some(frames) => turntable::turned(first, self.plan.camera.up.unwrap_or(glam::DVec3::Y), frame, frames),
-            None => *first,
+    /// A bare mesh is lit from where it is looked at; a scene file says what light there is.
+    fn light(&self, scene: &mut Scene, camera: &CameraDesc) {
+        if self.plan.kind == Input::Mesh {
+            scene.light_from(camera);
         }
     }
 
-    fn build(&self, scene: &Scene) -> Result<AnyBackend, Failure> {
+    fn frame_camera(&self, chosen: &Chosen, frame: u32) -> CameraDesc {
+        match self.plan.camera.turntable {
+            Some(frames) => turntable::turned(&chosen.camera, chosen.axis, frame, frames),
+            None => chosen.camera,
+        }
+    }
+
+    fn build(&self, scene: &Scene, job: &Job) -> Result<AnyBackend, Failure> {
         self.progress.stage(Stage::Build);
-        let crop = self.plan.job.crop;
-        let pixels =
-            u64::from(crop.x1 - crop.x0) * u64::from(crop.y1 - crop.y0) * u64::from(self.plan.turntable.unwrap_or(1));
+        let (crop, frames) = (job.crop, self.plan.camera.turntable.unwrap_or(1));
+        let pixels = u64::from(crop.x1 - crop.x0) * u64::from(crop.y1 - crop.y0) * u64::from(frames);
         self.progress.expect_pixels(pixels);
-        let rays_per_pixel = u64::from(self.plan.job.spp) * (1 + scene.lights.len() as u64);
+        let at_light = |l: &Light| if l.radius > 0.0 { u64::from(job.light_samples) } else { 1 };
+        let rays_per_sample = 1 + scene.lights.iter().map(at_light).sum::<u64>();
         let options = BuildOptions {
             threads: self.plan.threads,
-            rays_expected: pixels.saturating_mul(rays_per_pixel),
+            rays_expected: pixels.saturating_mul(u64::from(job.spp)).saturating_mul(rays_per_sample),
             cancel: &self.control.cancel,
             progress: Some(&|share| self.progress.report(share)),
         };
@@ -187,20 +228,23 @@ impl Run<'_> {
     fn save(
         &self,
         film: &Film,
-        backend: &AnyBackend,
         frame: u32,
+        display: &Display,
+        notes: &Notes,
         written: &mut Vec<(PathBuf, u64)>,
     ) -> Result<(), Failure> {
-        let notes = notes(self.plan, backend);
         for Output { target, format } in &self.plan.outputs {
             match target {
                 Target::File(path) => {
-                    let path = self.plan.turntable.map_or_else(|| path.clone(), |_| turntable::frame_path(path, frame));
-                    written.extend(film::save_all(film, &path, *format, &notes)?);
+                    let path = match self.plan.camera.turntable {
+                        Some(_) => turntable::frame_path(path, frame),
+                        None => path.clone(),
+                    };
+                    written.extend(film::save_all(film, &path, *format, display, notes)?);
                 }
                 Target::Stdout => {
                     let mut bytes = Cursor::new(Vec::new());
-                    film::encode(film, *format, &notes, &mut bytes)
+                    film::encode(film, *format, display, notes, &mut bytes)
                         .map_err(|e| Failure::new(Exit::Output, "cannot make the image for stdout").because(e))?;
                     output::print(bytes.get_ref())?;
                     written.push(("stdout".into(), bytes.get_ref().len() as u64));
@@ -211,13 +255,26 @@ impl Run<'_> {
     }
 }
 
+/// How a file is read, as the flags have it.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading<'a> {
+    pub smooth: Option<f64>,
+    pub allow: &'a [PathBuf],
+    pub defines: &'a [String],
+}
+
 /// Reads a scene and shows how far it is.
-pub fn load(path: &Path, smooth: Option<f64>, control: &Control, progress: &Progress) -> Result<Loaded, scene::Error> {
+pub fn load(
+    path: &Path,
+    reading: &Reading<'_>,
+    control: &Control,
+    progress: &Progress,
+) -> Result<Loaded, scene::Error> {
     let report = |done: u64, total: u64| progress.report(done as f64 / total.max(1) as f64);
     let options = LoadOptions {
-        smooth,
-        allow: Vec::new(),
-        overrides: Vec::new(),
+        smooth: reading.smooth,
+        allow: reading.allow.to_vec(),
+        overrides: reading.defines.iter().map(|d| Override::from(d.as_str())).collect(),
         cancel: &control.cancel,
         progress: Some(&report),
     };
@@ -225,16 +282,27 @@ pub fn load(path: &Path, smooth: Option<f64>, control: &Control, progress: &Prog
 }
 
 /// What decides the pixels, and nothing else: no threads, no time, no folder.
-fn notes(plan: &Plan, backend: &AnyBackend) -> Notes {
-    let (job, name) = (&plan.job, plan.input.file_name().unwrap_or_default());
+fn notes(plan: &Plan, settings: &Settings, backend: &AnyBackend) -> Notes {
+    let (job, name) = (&settings.job, plan.input.file_name().unwrap_or_default());
     let backend = match (backend.kind(), EMBREE) {
         (backend::BackendKind::Embree, Some(version)) => format!("embree {version}"),
         (kind, _) => kind.name().to_owned(),
     };
+    let curve = match settings.display.tonemap {
+        Tonemap::None => String::new(),
+        other => format!(", tonemap {}", other.name()),
+    };
+    let exposure = match settings.display.exposure {
+        0.0 => String::new(),
+        ev => format!(", exposure {ev}"),
+    };
     Notes {
         software: format!("tison {}", *VERSION),
         title: name.to_string_lossy().into_owned(),
-        comment: format!("{}x{}, spp {}, seed {}, backend {backend}", job.size.0, job.size.1, job.spp, job.seed),
+        comment: format!(
+            "{}x{}, spp {}, seed {}, backend {backend}{curve}{exposure}",
+            job.size.0, job.size.1, job.spp, job.seed
+        ),
     }
 }
 
@@ -264,6 +332,7 @@ fn merge(all: &mut RenderStats, one: &RenderStats, index: u32) {
     all.rays.reflected += one.rays.reflected;
     all.rays.refracted += one.rays.refracted;
     all.cut_off_max = all.cut_off_max.max(one.cut_off_max);
+    all.cut_off_is_estimate |= one.cut_off_is_estimate;
     all.cut_off_mean += (one.cut_off_mean - all.cut_off_mean) / f64::from(index + 1);
     all.non_finite_samples += one.non_finite_samples;
     all.shadow_rays_facing_away += one.shadow_rays_facing_away;

@@ -2,21 +2,25 @@
 
 use super::exit::Failure;
 use super::message::Messages;
-use super::plan::{Plan, Target};
-use super::render::Done;
+use super::plan::Plan;
+use super::render::{Done, Ready};
+use super::settings::Settings;
 use super::style::{bytes, counted, grouped, seconds};
+use super::target::Target;
 use super::{output, stats, system};
 use tison::backend::AnyBackend;
 use tison::film;
-use tison::scene::{CameraDesc, Projection, Scene, SceneCounts};
+use tison::scene::{CameraDesc, Projection, SceneCounts, Unused};
 
 /// The story of a run.
 #[derive(Debug)]
 pub struct Report<'a> {
     pub plan: &'a Plan,
+    pub settings: &'a Settings,
     pub counts: SceneCounts,
     /// Name of what a scene may need, and whether this one does.
     pub needs: Vec<(&'static str, bool)>,
+    pub unused: Unused,
     pub scene_bytes: u64,
     pub backend_bytes: u64,
     /// Release, packet width, build quality.
@@ -29,15 +33,18 @@ pub struct Report<'a> {
 
 impl<'a> Report<'a> {
     /// Of a run that is over.
-    pub fn new(plan: &'a Plan, scene: &Scene, backend: &AnyBackend, camera: &CameraDesc, done: Done) -> Self {
+    pub fn new(plan: &'a Plan, ready: &'a Ready, backend: &AnyBackend, done: Done) -> Self {
+        let scene = &ready.loaded.scene;
         Self {
             plan,
+            settings: &ready.settings,
             counts: scene.counts(),
             needs: scene.needs().list().to_vec(),
+            unused: ready.loaded.unused,
             scene_bytes: scene.bytes() as u64,
             backend_bytes: backend.bytes(),
             details: backend.details(),
-            camera: *camera,
+            camera: ready.chosen.camera,
             done,
             peak_memory: system::peak_memory(),
         }
@@ -65,12 +72,12 @@ impl<'a> Report<'a> {
     /// Pixels of all frames.
     pub fn pixels(&self) -> u64 {
         let (width, height) = self.image_size();
-        u64::from(width) * u64::from(height) * u64::from(self.plan.turntable.unwrap_or(1))
+        u64::from(width) * u64::from(height) * u64::from(self.plan.camera.turntable.unwrap_or(1))
     }
 
     /// Pixels of one image across and down.
     pub fn image_size(&self) -> (u32, u32) {
-        let crop = self.plan.job.crop;
+        let crop = self.settings.job.crop;
         (crop.x1 - crop.x0, crop.y1 - crop.y0)
     }
 
@@ -100,14 +107,21 @@ impl<'a> Report<'a> {
 
     fn input_line(&self) -> String {
         let c = &self.counts;
-        let mut line = format!(
-            "input     {}: {}, {}, {}, {}",
-            self.plan.input.display(),
-            counted(c.triangles as u64, "triangle"),
-            counted(c.vertices as u64, "vertex"),
-            counted(c.materials as u64, "material"),
-            counted(c.lights as u64, "light"),
-        );
+        let all = [
+            (c.triangles, "triangle"),
+            (c.vertices, "vertex"),
+            (c.instances, "instance"),
+            (c.spheres, "sphere"),
+            (c.cubes, "cube"),
+            (c.cylinders, "cylinder"),
+            (c.quads, "quad"),
+            (c.materials, "material"),
+            (c.textures, "texture"),
+            (c.lights, "light"),
+        ];
+        let always = |what: &str| matches!(what, "material" | "light");
+        let told = all.iter().filter(|&&(n, what)| n > 0 || always(what)).map(|&(n, what)| counted(n as u64, what));
+        let mut line = format!("input     {}: {}", self.plan.input.display(), told.collect::<Vec<_>>().join(", "));
         if c.degenerate > 0 {
             line += &format!("; {} without area", grouped(c.degenerate as u64));
         }
@@ -124,8 +138,9 @@ impl<'a> Report<'a> {
 
     fn image_line(&self) -> String {
         let (width, height) = self.image_size();
-        let frames = self.plan.turntable.map_or(String::new(), |n| format!(", {}", counted(u64::from(n), "frame")));
-        let (spp, seed) = (self.plan.job.spp, self.plan.job.seed);
+        let frames =
+            self.plan.camera.turntable.map_or(String::new(), |n| format!(", {}", counted(u64::from(n), "frame")));
+        let (spp, seed) = (self.settings.job.spp, self.settings.job.seed);
         let samples = counted(u64::from(spp), "sample");
         let hint = if spp.is_power_of_two() { "" } else { " (a power of two is spread better)" };
         format!("image     {width}x{height}, {samples} a pixel{hint}, seed {seed}{frames}")
@@ -145,21 +160,35 @@ impl<'a> Report<'a> {
 
     fn time_line(&self) -> String {
         let s = &self.done.seconds;
-        let stages =
-            [("read", s.read), ("build", s.build), ("render", s.render), ("write", s.write), ("total", s.total)];
-        let stages = stages.map(|(name, t)| format!("{name} {}", seconds(t)));
+        let stages = [
+            ("read", s.read),
+            ("textures", s.textures),
+            ("build", s.build),
+            ("render", s.render),
+            ("write", s.write),
+            ("total", s.total),
+        ];
+        let textures = self.counts.textures > 0;
+        let stages = stages.iter().filter(|&&(name, _)| textures || name != "textures");
+        let stages: Vec<String> = stages.map(|&(name, t)| format!("{name} {}", seconds(t))).collect();
         let peak = self.peak_memory.map_or(String::new(), |p| format!("; peak memory {}", bytes(p)));
         format!("time      {}{peak}", stages.join(", "))
     }
 
     fn camera_line(&self) -> String {
-        let CameraDesc { eye, target, up, projection, aperture, .. } = self.camera;
+        let CameraDesc { eye, target, up, projection, aperture, focus, .. } = self.camera;
         let projection = match projection {
             Projection::Perspective { fov_deg } => format!("--fov {fov_deg}"),
             Projection::Orthographic { height } => format!("--ortho {height}"),
         };
         let v = |v: glam::DVec3| format!("{},{},{}", v.x, v.y, v.z);
-        format!("camera    --eye {} --target {} --up {} {projection} --aperture {aperture}", v(eye), v(target), v(up))
+        let focus = focus.filter(|_| aperture > 0.0).map_or(String::new(), |f| format!(" --focus {f}"));
+        format!(
+            "camera    --eye {} --target {} --up {} {projection} --aperture {aperture}{focus}",
+            v(eye),
+            v(target),
+            v(up)
+        )
     }
 
     fn skipped_line(&self) -> Option<String> {
@@ -168,7 +197,7 @@ impl<'a> Report<'a> {
             .map(|(name, why)| {
                 let name = name.replace('_', " ");
                 match why {
-                    stats::Skipped::Count(n) => format!("{} {name}", grouped(n)),
+                    stats::Skipped::Count(n) => format!("{name}: {}", grouped(n)),
                     stats::Skipped::Because(why) => format!("{name} ({why})"),
                 }
             })
@@ -180,6 +209,8 @@ impl<'a> Report<'a> {
         let s = &self.done.stats;
         let cut = if s.cut_off_max == 0.0 {
             "nothing cut off".into()
+        } else if s.cut_off_is_estimate {
+            format!("cut-off estimated to add {:.2e} to a pixel, {:.2e} on average", s.cut_off_max, s.cut_off_mean)
         } else {
             format!("cut-off adds at most {:.2e} to a pixel, {:.2e} on average", s.cut_off_max, s.cut_off_mean)
         };

@@ -21,18 +21,47 @@ pub fn skipped(report: &Report<'_>) -> Vec<(&'static str, Skipped)> {
             "reflection" => "no material mirrors",
             "refraction" => "no material refracts",
             "specular" => "no material has a highlight",
-            "smooth_normals" => "the mesh has no normals",
+            "smooth_normals" => "no mesh has normals",
+            "textures" => "no material has an image",
+            "area_lights" => "no light has a size",
+            "absorption" => "no material absorbs",
             "shadow_rays" => "no light changes any material",
             _ => "not needed",
         };
         (name, Skipped::Because(why))
     });
+    let unused = &report.unused;
     let counts = [
+        ("unused_materials", unused.materials as u64),
+        ("unused_textures", unused.textures as u64),
+        ("lights_without_power", unused.lights as u64),
         ("shadow_rays_facing_away", report.done.stats.shadow_rays_facing_away),
         ("branches_below_cut", report.done.stats.branches_below_cut),
     ];
     let counts = counts.into_iter().filter(|&(_, n)| n > 0).map(|(name, n)| (name, Skipped::Count(n)));
-    unneeded.chain(counts).collect()
+    unneeded.chain(not_drawn(report)).chain(kinds_without(&report.counts)).chain(counts).collect()
+}
+
+/// Random numbers that no ray needs.
+fn not_drawn(report: &Report<'_>) -> impl Iterator<Item = (&'static str, Skipped)> {
+    let job = &report.settings.job;
+    let jitter = match (job.spp, job.jitter_radius) {
+        (1, _) => Some("one sample a pixel"),
+        (_, 0.0) => Some("all samples go through the pixel's centre"),
+        _ => None,
+    };
+    let lens = (report.camera.aperture == 0.0).then_some("no lens: pinhole");
+    let parts = [("lens", lens), ("pixel_jitter", jitter)];
+    parts.into_iter().filter_map(|(name, why)| Some((name, Skipped::Because(why?))))
+}
+
+/// What no ray is tested against.
+fn kinds_without(c: &SceneCounts) -> impl Iterator<Item = (&'static str, Skipped)> + use<> {
+    let parts = [
+        ("user_geometry", c.spheres + c.cubes + c.cylinders + c.quads, "no analytic shapes"),
+        ("meshes", c.triangles, "no meshes"),
+    ];
+    parts.into_iter().filter(|&(_, n, _)| n == 0).map(|(name, _, why)| (name, Skipped::Because(why)))
 }
 
 /// Counts under the names that `info --json` uses too.
@@ -43,11 +72,14 @@ pub fn scene_json(c: &SceneCounts) -> Value {
         "non_finite": c.non_finite,
         "vertices": c.vertices,
         "objects": c.objects,
+        "instances": c.instances,
         "spheres": c.spheres,
         "cubes": c.cubes,
         "cylinders": c.cylinders,
+        "quads": c.quads,
         "lights": c.lights,
         "materials": c.materials,
+        "textures": c.textures,
     })
 }
 
@@ -72,12 +104,13 @@ pub fn json(report: &Report<'_>) -> Value {
         "embree": EMBREE,
         "threads": report.plan.threads,
         "image": {
-            "width": width, "height": height, "spp_mean": f64::from(report.plan.job.spp) * share,
-            "frames": report.plan.turntable.unwrap_or(1), "finished": share,
+            "width": width, "height": height, "spp_mean": f64::from(report.settings.job.spp) * share,
+            "frames": report.plan.camera.turntable.unwrap_or(1), "finished": share,
         },
         "scene": scene_json(&report.counts),
         "seconds": {
-            "read": s.read, "textures": 0.0, "build": s.build, "render": s.render, "write": s.write, "total": s.total,
+            "read": s.read, "textures": s.textures, "build": s.build, "render": s.render, "write": s.write,
+            "total": s.total,
         },
         "rays": {
             "camera": rays.camera, "shadow": rays.shadow, "reflected": rays.reflected, "refracted": rays.refracted,
@@ -89,6 +122,7 @@ pub fn json(report: &Report<'_>) -> Value {
         "error": {
             "cut_off_max": stats.cut_off_max,
             "cut_off_mean": stats.cut_off_mean,
+            "cut_off_is_estimate": stats.cut_off_is_estimate,
             "sampling_rmse_estimate": Value::Null,
             "non_finite_samples": stats.non_finite_samples,
         },

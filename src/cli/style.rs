@@ -2,6 +2,7 @@
 
 use std::io::IsTerminal;
 use std::time::Duration;
+use tison::scene::format::Look;
 
 /// Colours where they are welcome: on a terminal that is not dumb and without `NO_COLOR`.
 #[derive(Clone, Copy, Debug)]
@@ -15,6 +16,11 @@ impl Style {
         let unwelcome = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty())
             || std::env::var_os("TERM").is_some_and(|t| t == "dumb");
         Self { colour: std::io::stderr().is_terminal() && !unwelcome }
+    }
+
+    /// The same for messages that the library makes.
+    pub fn look(self) -> Look {
+        if self.colour { Look::Coloured } else { Look::Plain }
     }
 
     /// Bold red.

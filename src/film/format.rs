@@ -41,6 +41,12 @@ impl Format {
         })
     }
 
+    /// Whether it holds light as linear floats, so that no [`Display`](super::Display) matters.
+    #[must_use]
+    pub fn is_linear(self) -> bool {
+        matches!(self, Self::Exr | Self::Hdr | Self::Pfm)
+    }
+
     /// Whether auxiliary images are part of the same file.
     #[must_use]
     pub fn holds_aovs(self) -> bool {

@@ -3,6 +3,7 @@
 mod aov;
 mod format;
 mod save;
+mod tone;
 mod write;
 
 use rayon::prelude::*;
@@ -10,6 +11,7 @@ use rayon::prelude::*;
 pub use aov::{Aov, AovImage};
 pub use format::Format;
 pub use save::{SaveError, Sink, abandon, check_target, is_special_file, save};
+pub use tone::{Display, Tonemap};
 pub use write::{Notes, encode, files, save_all};
 
 /// A rendered image: linear colour and whatever else was asked for, row by row from the top.

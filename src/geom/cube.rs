@@ -126,6 +126,10 @@ impl Shape for Cube {
         some_lane(t)
     }
 
+    fn contains(&self, p: DVec3) -> bool {
+        (p - self.center).abs().cmplt(self.half).all()
+    }
+
     #[inline]
     fn refine_for(&self, o: DVec3, d: DVec3, t_near: f64, t: f64, _: bool) -> ShapePoint {
         let own = self.hit(o, d, t_near, f64::INFINITY);

@@ -171,6 +171,10 @@ impl Shape for Cylinder {
         some_lane(t)
     }
 
+    fn contains(&self, p: DVec3) -> bool {
+        self.capped && p.truncate().length_squared() < self.radius * self.radius && p.z.abs() < self.half
+    }
+
     #[inline]
     fn refine_for(&self, o: DVec3, d: DVec3, t_near: f64, t: f64, uv: bool) -> ShapePoint {
         let own = self.hit(o, d, t_near, f64::INFINITY);

@@ -11,6 +11,7 @@ mod ray;
 mod shape;
 mod shape_set;
 mod sphere;
+mod transform;
 pub mod triangle;
 
 pub use bounds::Bounds;
@@ -24,3 +25,5 @@ pub use ray::{Hit, INVALID_ID, Ray};
 pub use shape::{Lanes, Shape, ShapeError, ShapePoint};
 pub use shape_set::{Affine, Plain, ShapeSet};
 pub use sphere::Sphere;
+pub use transform::invert;
+pub(crate) use transform::{cofactors, mirrors, normal_matrix};

@@ -58,6 +58,10 @@ impl Shape for Quad {
         some_lane(t)
     }
 
+    fn contains(&self, _: DVec3) -> bool {
+        false
+    }
+
     #[inline]
     fn refine_for(&self, o: DVec3, d: DVec3, t_near: f64, t: f64, _: bool) -> ShapePoint {
         let t = self.hit(o, d, t_near, f64::INFINITY).unwrap_or(t);

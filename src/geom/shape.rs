@@ -19,6 +19,9 @@ pub trait Shape: Copy + std::fmt::Debug + Send + Sync + 'static {
     /// when all do. Meant to be inlined into a [`Kernel`](crate::simd::Kernel).
     fn hit_lanes<T: Copy + Into<f64>, const N: usize>(&self, rays: &Lanes<'_, T, N>) -> Option<[f64; N]>;
 
+    /// Whether `p` lies inside; never for a surface that encloses nothing.
+    fn contains(&self, p: DVec3) -> bool;
+
     /// The surface point of the nearest hit beyond `t_near`.
     ///
     /// `t` is what the backend reported. It decides only where this computation, asked about a

@@ -1,5 +1,6 @@
 //! Many shapes of one class, as backends take them: a loop or callback per class, no dispatch per shape.
 
+use super::transform::{invert, normal_matrix};
 use super::{Bounds, Lanes, Shape, ShapeError, ShapePoint};
 use crate::simd::{self, Kernel};
 use glam::{DAffine3, DMat3, DVec3};
@@ -46,6 +47,9 @@ pub trait ShapeSet: Send + Sync {
     ) -> Option<[f64; N]>
     where
         Self: Sized;
+
+    /// Whether `p` lies inside of shape `prim`; see [`Shape::contains`].
+    fn contains(&self, prim: u32, p: DVec3) -> bool;
 
     /// Bytes of the shapes.
     fn bytes(&self) -> usize;
@@ -123,6 +127,10 @@ impl<S: Shape> ShapeSet for Plain<S> {
         size_of_val(&self.shapes[..])
     }
 
+    fn contains(&self, prim: u32, p: DVec3) -> bool {
+        self.shapes[prim as usize].contains(p)
+    }
+
     fn bounds(&self, prim: u32) -> Bounds {
         self.shapes[prim as usize].bounds(&DAffine3::IDENTITY)
     }
@@ -198,6 +206,11 @@ impl<S: Shape> ShapeSet for Affine<S> {
         self.placed.len() as u32
     }
 
+    fn contains(&self, prim: u32, p: DVec3) -> bool {
+        let placed = &self.placed[prim as usize];
+        placed.shape.contains(placed.inverse * (p - placed.translation))
+    }
+
     fn bytes(&self) -> usize {
         size_of_val(&self.placed[..]) + size_of_val(&self.to_world[..])
     }
@@ -246,48 +259,5 @@ impl<S: Shape> ShapeSet for Affine<S> {
             extent: 0.5 * self.bounds(prim).size().max_element(),
             ..local
         }
-    }
-}
-
-/// Exact power of two near the largest entry of `m`: with it divided out, no determinant over- or underflows.
-fn magnitude(m: &DMat3) -> f64 {
-    let largest = m.to_cols_array().into_iter().fold(0.0, |a: f64, x| a.max(x.abs()));
-    let exponent = (largest.to_bits() >> 52) as i32 - 1023;
-    2f64.powi(exponent.clamp(-1000, 1000))
-}
-
-/// Columns of the cofactor matrix.
-fn cofactors(m: &DMat3) -> DMat3 {
-    let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
-    DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y))
-}
-
-/// What takes normals to world space: the cofactor matrix with the determinant's sign, which is the
-/// inverse transpose up to a positive factor, without a division.
-fn normal_matrix(m: &DMat3) -> DMat3 {
-    let m = *m * (1.0 / magnitude(m));
-    let cof = cofactors(&m);
-    let det = m.x_axis.dot(cof.x_axis);
-    cof * det.signum()
-}
-
-/// Inverse of the linear part of `to_world`.
-fn invert(to_world: &DAffine3) -> Result<DMat3, ShapeError> {
-    /// Share of the box's volume that the rounding of the entries alone can make.
-    const NOTHING: f64 = 4e-15;
-    if !to_world.is_finite() {
-        return Err(ShapeError::TransformNotFinite);
-    }
-    let scale = 1.0 / magnitude(&to_world.matrix3);
-    let m = to_world.matrix3 * scale;
-    let cof = cofactors(&m);
-    let det = m.x_axis.dot(cof.x_axis);
-    let volume = det.abs() / (m.x_axis.length() * m.y_axis.length() * m.z_axis.length());
-    let inverse = cof.transpose() * (1.0 / det) * scale;
-    // A NaN, from an axis of length 0, is no volume either.
-    if volume >= NOTHING && inverse.is_finite() {
-        Ok(inverse)
-    } else {
-        Err(ShapeError::Singular { volume: if volume > 0.0 { volume } else { 0.0 } })
     }
 }

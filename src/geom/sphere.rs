@@ -119,6 +119,10 @@ impl Shape for Sphere {
         some_lane(t)
     }
 
+    fn contains(&self, p: DVec3) -> bool {
+        (p - self.center).length_squared() < self.radius * self.radius
+    }
+
     #[inline]
     fn refine_for(&self, o: DVec3, d: DVec3, t_near: f64, t: f64, uv: bool) -> ShapePoint {
         let t = self.hit(o, d, t_near, f64::INFINITY).unwrap_or(t);

@@ -92,7 +92,7 @@ pub fn intersect(ray: &ShearedRay, p: [Vec3; 3]) -> Option<TriangleHit> {
 
 /// As [`intersect`], for corners that have their coordinates in the order of
 /// [`ShearedRay::axes`].
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn intersect_permuted(ray: &ShearedRay, p: [Vec3; 3]) -> Option<TriangleHit> {
     let [a, b, c] = p.map(|q| ray.project(q));

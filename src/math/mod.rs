@@ -7,4 +7,4 @@ mod sampling;
 
 pub use frame::Frame;
 pub use pow::pow01;
-pub use sampling::{PixelSamples, concentric_disc};
+pub use sampling::{Branch, PixelSamples, concentric_disc, polar_disc, rejection_disc, uniform_radius_disc};

@@ -1,12 +1,15 @@
-//! Sixteen hits side by side: from what a backend reports to points that can be shaded.
+//! Sixteen surface points side by side, ready to be shaded.
 //!
 //! Loops over the lanes have no branch and no call, so that they compile to vector code.
 
-#![expect(clippy::needless_range_loop, reason = "an index runs over many arrays at once")]
-
+use super::facets::Facets;
+use super::media::Medium;
+use super::paint::{Paint, Palette};
+use super::shapes::ShapeHits;
 use crate::geom::{Hit, LANES, Ray, RayHitPacket};
-use crate::scene::{Material, Scene};
-use crate::simd::{self, Kernel};
+use crate::math::Branch;
+use crate::scene::{Object, Scene};
+use crate::simd::Kernel;
 use glam::{DVec3, Vec3};
 
 /// One number per lane.
@@ -26,51 +29,18 @@ pub struct Path {
     pub depth: u32,
     /// Share of the ray's colour that arrives in the sample.
     pub weight: Vec3,
+    /// Which of the sample's paths it is.
+    pub branch: Branch,
+    /// What the ray travels in.
+    pub medium: Medium,
 }
 
 impl Path {
     /// The path of a camera ray.
     #[must_use]
     pub fn of_sample(slot: u32) -> Self {
-        Self { slot, depth: 0, weight: Vec3::ONE }
+        Self { slot, depth: 0, weight: Vec3::ONE, branch: Branch::CAMERA, medium: Medium::OUTSIDE }
     }
-}
-
-/// What lights ask of a material, in one place.
-#[derive(Clone, Copy, Debug)]
-pub struct Paint {
-    /// Emission, and the answer to the ambient light.
-    own: Vec3,
-    diffuse: Vec3,
-    specular: Vec3,
-    shininess: f32,
-}
-
-impl Paint {
-    /// `material` in ambient light.
-    #[must_use]
-    pub fn new(material: &Material, ambient: Vec3) -> Self {
-        Self {
-            own: material.emission + material.ambient * ambient,
-            diffuse: material.diffuse,
-            specular: material.specular,
-            shininess: material.shininess,
-        }
-    }
-}
-
-/// What a hit of a triangle is computed from.
-#[repr(align(64))]
-#[derive(Debug)]
-pub struct Facets {
-    o: [F32; 3],
-    d: [F32; 3],
-    reported: [F32; 2],
-    corners: [[F32; 3]; 3],
-    normals: [[F32; 3]; 3],
-    smooth: [bool; LANES],
-    geom: [u32; LANES],
-    prim: [u32; LANES],
 }
 
 /// Hits made into surface points, in scene space; f64 where a decision hangs on it. Lanes
@@ -84,6 +54,12 @@ pub struct Block {
     pub slot: [u32; LANES],
     /// Bounces so far.
     pub depth: [u32; LANES],
+    /// Which of the sample's paths.
+    pub branch: [Branch; LANES],
+    /// What the ray travelled in.
+    pub medium: [Medium; LANES],
+    /// Object and primitive.
+    pub id: [[u32; 2]; LANES],
     /// Index of the material.
     pub material: [u32; LANES],
     /// Share of the colour that arrives in the sample.
@@ -107,76 +83,10 @@ pub struct Block {
     /// Where shadow rays start: off the surface, and where it only pretends to be smooth,
     /// lifted out of the facet's own shadow.
     pub front: [F32; 3],
-    /// Whether the ray met the side that the winding calls outer.
+    /// Whether the ray met the outer side.
     pub entering: [bool; LANES],
     /// What the point shows by itself, and after the lights what they add; before the weight.
     pub color: [F32; 3],
-}
-
-impl Facets {
-    /// A good hit in every lane: lanes that no hit fills give numbers all the same, and a
-    /// packet with a NaN in it is slow to trace.
-    pub const EMPTY: Self = Self {
-        o: [[0.25; LANES], [0.25; LANES], [1.0; LANES]],
-        d: [[0.0; LANES], [0.0; LANES], [-1.0; LANES]],
-        reported: [[0.25; LANES]; 2],
-        corners: [
-            [[0.0; LANES]; 3],
-            [[1.0; LANES], [0.0; LANES], [0.0; LANES]],
-            [[0.0; LANES], [1.0; LANES], [0.0; LANES]],
-        ],
-        normals: [[[0.0; LANES]; 3]; 3],
-        smooth: [false; LANES],
-        geom: [0; LANES],
-        prim: [0; LANES],
-    };
-
-    /// Takes over ray and hit `from` of `packet`.
-    #[inline]
-    pub fn set(&mut self, lane: usize, packet: &RayHitPacket, from: usize) {
-        let ray = &packet.ray;
-        for (to, of) in self.o.iter_mut().zip([&ray.o_x, &ray.o_y, &ray.o_z]) {
-            to[lane] = of[from];
-        }
-        for (to, of) in self.d.iter_mut().zip([&ray.d_x, &ray.d_y, &ray.d_z]) {
-            to[lane] = of[from];
-        }
-        self.reported[0][lane] = packet.hit.u[from];
-        self.reported[1][lane] = packet.hit.v[from];
-        self.geom[lane] = packet.hit.geom_id[from];
-        self.prim[lane] = packet.hit.prim_id[from];
-    }
-
-    /// Looks up what belongs to the hits of the first `len` lanes: first where everything
-    /// is, then everything, so that the memory has many questions to work on at a time.
-    fn gather(&mut self, scene: &Scene, block: &mut Block, paints: &[Paint]) {
-        let mut faces = [[0; 3]; LANES];
-        let mut normals = [None; LANES];
-        for lane in 0..block.len {
-            let mesh = scene.objects[self.geom[lane] as usize].mesh().expect("a triangle was hit");
-            let (data, prim) = (&*mesh.data, self.prim[lane]);
-            faces[lane] = data.triangles.faces()[prim as usize];
-            block.material[lane] = mesh.material(prim);
-            normals[lane] = data.normals.as_ref().map(|n| n.of(data.triangles.faces(), prim as usize));
-        }
-        let put = |to: &mut [F32; 3], lane: usize, v: Vec3| {
-            to[0][lane] = v.x;
-            to[1][lane] = v.y;
-            to[2][lane] = v.z;
-        };
-        for lane in 0..block.len {
-            let mesh = scene.objects[self.geom[lane] as usize].mesh().expect("a triangle was hit");
-            for (to, i) in self.corners.iter_mut().zip(faces[lane]) {
-                put(to, lane, mesh.data.triangles.point(i));
-            }
-            let normals = normals[lane].and_then(|at| mesh.data.normals_at(at));
-            self.smooth[lane] = normals.is_some();
-            for (to, n) in self.normals.iter_mut().zip(normals.unwrap_or_default()) {
-                put(to, lane, n);
-            }
-            block.paint(lane, &paints[block.material[lane] as usize]);
-        }
-    }
 }
 
 impl Block {
@@ -185,6 +95,9 @@ impl Block {
         len: 0,
         slot: [0; LANES],
         depth: [0; LANES],
+        branch: [Branch::CAMERA; LANES],
+        medium: [Medium::OUTSIDE; LANES],
+        id: [[0; 2]; LANES],
         material: [0; LANES],
         weight: [[0.0; LANES]; 3],
         diffuse: [[0.0; LANES]; 3],
@@ -205,13 +118,29 @@ impl Block {
     pub fn set(&mut self, lane: usize, path: &Path) {
         self.slot[lane] = path.slot;
         self.depth[lane] = path.depth;
+        self.branch[lane] = path.branch;
+        self.medium[lane] = path.medium;
         for axis in 0..3 {
             self.weight[axis][lane] = path.weight[axis];
         }
     }
 
+    /// The path that `lane` is on.
     #[inline]
-    fn paint(&mut self, lane: usize, paint: &Paint) {
+    #[must_use]
+    pub fn path(&self, lane: usize) -> Path {
+        Path {
+            slot: self.slot[lane],
+            depth: self.depth[lane],
+            weight: Self::vec3(&self.weight, lane),
+            branch: self.branch[lane],
+            medium: self.medium[lane],
+        }
+    }
+
+    /// Gives `lane` the colours of a material.
+    #[inline]
+    pub fn paint(&mut self, lane: usize, paint: &Paint) {
         self.shininess[lane] = paint.shininess;
         for axis in 0..3 {
             self.diffuse[axis][lane] = paint.diffuse[axis];
@@ -220,25 +149,26 @@ impl Block {
         }
     }
 
-    /// Makes the hits in the first `len` lanes of `facets` into points.
-    pub fn finish(&mut self, scene: &Scene, facets: &mut Facets, len: usize, paints: &[Paint]) {
-        self.len = len;
-        facets.gather(scene, self, paints);
-        simd::run(Finish { facets, block: self });
-    }
-
     /// One hit by itself, in lane 0.
     #[must_use]
-    pub fn single(scene: &Scene, ray: &Ray, hit: &Hit) -> Self {
-        let (mut facets, mut block) = (Facets::EMPTY, Self::EMPTY);
+    pub fn single(scene: &Scene, ray: &Ray, hit: &Hit, path: &Path) -> Self {
+        let mut block = Self::EMPTY;
         let mut packet = RayHitPacket::EMPTY;
         packet.ray.set(0, ray);
         packet.set_hit(0, Some(hit));
-        facets.set(0, &packet, 0);
-        block.set(0, &Path::of_sample(0));
-        let paints: Vec<Paint> = scene.materials.iter().map(|m| Paint::new(m, scene.ambient)).collect();
-        block.finish(scene, &mut facets, 1, &paints);
+        block.set(0, path);
+        block.id[0] = [hit.geom_id, hit.prim_id];
+        let palette = Palette::of(scene);
+        match &scene.objects[hit.geom_id as usize] {
+            Object::Shapes(_) => Self::finish_one(ShapeHits::default(), scene, &packet, &mut block, &palette),
+            _ => Self::finish_one(Facets::EMPTY, scene, &packet, &mut block, &palette),
+        }
         block
+    }
+
+    fn finish_one(mut hits: impl Hits, scene: &Scene, packet: &RayHitPacket, block: &mut Self, palette: &Palette) {
+        hits.set(0, packet, 0);
+        hits.finish(1, scene, palette, block);
     }
 
     /// A vector of `lane`.
@@ -256,41 +186,37 @@ impl Block {
     }
 }
 
-struct Finish<'a> {
-    facets: &'a Facets,
-    block: &'a mut Block,
+/// Hits of one kind, collected until a block is full.
+pub trait Hits {
+    /// Takes over ray and hit `from` of `packet`.
+    fn set(&mut self, lane: usize, packet: &RayHitPacket, from: usize);
+
+    /// Makes the first `len` of them into the points of `block`, and gives them their colours.
+    fn finish(&mut self, len: usize, scene: &Scene, palette: &Palette, block: &mut Block);
 }
 
-impl Kernel for Finish<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let (f, b) = (self.facets, self.block);
-        let mut refined = Refined::EMPTY;
-        refine(f, &mut refined);
-        shading_normals(f, &mut refined);
-        leave(&refined, b);
-    }
-}
-
-/// Between the steps.
+/// Points on their way into a block.
 #[repr(align(64))]
-struct Refined {
-    weights: [F64; 3],
-    p: [F64; 3],
-    ng: [F64; 3],
-    ns: [F64; 3],
-    lifted: [F64; 3],
-    extent: F64,
-    to_eye: [F32; 3],
+pub struct Points {
+    /// The points.
+    pub p: [F64; 3],
+    /// Unit geometric normals on the ray's side.
+    pub ng: [F64; 3],
+    /// Unit shading normals on the same side.
+    pub ns: [F64; 3],
+    /// The points that shadow rays are to start from.
+    pub lifted: [F64; 3],
+    /// See [`Block::extent`].
+    pub extent: F64,
+    /// See [`Block::to_eye`].
+    pub to_eye: [F32; 3],
     /// 1 for a hit from outside, -1 from inside.
-    side: F64,
+    pub side: F64,
 }
 
-impl Refined {
-    const EMPTY: Self = Self {
-        weights: [[0.0; LANES]; 3],
+impl Points {
+    /// Numbers that do no harm.
+    pub const EMPTY: Self = Self {
         p: [[0.0; LANES]; 3],
         ng: [[0.0; LANES]; 3],
         ns: [[0.0; LANES]; 3],
@@ -301,129 +227,50 @@ impl Refined {
     };
 }
 
-type V = [f64; 3];
+/// Three numbers of one lane.
+pub type V = [f64; 3];
 
+/// A vector of `lane`, widened.
 #[inline(always)]
-fn wide(of: &[F32; 3], lane: usize) -> V {
+pub fn wide(of: &[F32; 3], lane: usize) -> V {
     [f64::from(of[0][lane]), f64::from(of[1][lane]), f64::from(of[2][lane])]
 }
 
+/// A vector of `lane`.
 #[inline(always)]
-fn get(of: &[F64; 3], lane: usize) -> V {
+pub fn get(of: &[F64; 3], lane: usize) -> V {
     [of[0][lane], of[1][lane], of[2][lane]]
 }
 
+/// Sets a vector of `lane`.
 #[inline(always)]
-fn put(to: &mut [F64; 3], lane: usize, v: V) {
+pub fn put(to: &mut [F64; 3], lane: usize, v: V) {
     to[0][lane] = v[0];
     to[1][lane] = v[1];
     to[2][lane] = v[2];
 }
 
-#[inline(always)]
-fn dot(a: V, b: V) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+/// Puts finished points into a block.
+pub struct Leave<'a> {
+    /// The points.
+    pub points: &'a Points,
+    /// Where they go.
+    pub block: &'a mut Block,
 }
 
-#[inline(always)]
-fn sub(a: V, b: V) -> V {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
+impl Kernel for Leave<'_> {
+    type Output = ();
 
-#[inline(always)]
-fn scale(a: V, s: f64) -> V {
-    [a[0] * s, a[1] * s, a[2] * s]
-}
-
-#[inline(always)]
-fn cross(a: V, b: V) -> V {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// The steps of [`geom::triangle::refine`](crate::geom::triangle::refine) for all lanes, and the
-/// facet's normal turned to the ray.
-#[inline(always)]
-fn refine(f: &Facets, out: &mut Refined) {
-    for i in 0..LANES {
-        let (o, d) = (wide(&f.o, i), wide(&f.d, i));
-        let p0 = wide(&f.corners[0], i);
-        let e1 = sub(wide(&f.corners[1], i), p0);
-        let e2 = sub(wide(&f.corners[2], i), p0);
-        let ng = cross(e1, e2);
-        let q = cross(sub(o, p0), d);
-        let along = dot(d, ng);
-        let inv = -1.0 / along;
-        let (u, v) = (dot(e2, q) * inv, -dot(e1, q) * inv);
-        // Seen exactly edge-on there is nothing better than what was reported.
-        let good = u.is_finite() & v.is_finite();
-        let u = if good { u } else { f64::from(f.reported[0][i]) };
-        let v = if good { v } else { f64::from(f.reported[1][i]) };
-        // The backend has decided that it is a hit: rounding never makes it a miss.
-        let (u, v) = (u.clamp(0.0, 1.0), v.clamp(0.0, 1.0));
-        let shrink = 1.0 / (u + v).max(1.0);
-        let (u, v) = (u * shrink, v * shrink);
-        let p = [0, 1, 2].map(|k| p0[k] + u * e1[k] + v * e2[k]);
-        let side = if along < 0.0 { 1.0 } else { -1.0 };
-        out.side[i] = side;
-        let unit = scale(ng, side / dot(ng, ng).sqrt());
-        put(&mut out.p, i, p);
-        put(&mut out.ng, i, unit);
-        out.weights[0][i] = 1.0 - u - v;
-        out.weights[1][i] = u;
-        out.weights[2][i] = v;
-        let e3 = sub(wide(&f.corners[2], i), wide(&f.corners[1], i));
-        let size = |e: V| e[0].abs() + e[1].abs() + e[2].abs();
-        out.extent[i] = size(e1).max(size(e2)).max(size(e3));
-        let d = [f.d[0][i], f.d[1][i], f.d[2][i]];
-        let back = -1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-        for k in 0..3 {
-            out.to_eye[k][i] = d[k] * back;
-        }
-    }
-}
-
-/// The shading normal from the corners where they have one, and the point from which the
-/// surface that those normals pretend would cast its shadows: the facet's own, lifted onto
-/// the corners' tangent planes where those lie outside.
-///
-/// Source of the lift: J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, ch. 4.
-#[inline(always)]
-fn shading_normals(f: &Facets, out: &mut Refined) {
-    if !f.smooth.contains(&true) {
-        out.ns = out.ng;
-        out.lifted = out.p;
-        return;
-    }
-    for i in 0..LANES {
-        let (p, ng) = (get(&out.p, i), get(&out.ng, i));
-        let mut sum = [0.0; 3];
-        let mut lift = [0.0; 3];
-        for c in 0..3 {
-            let n = scale(wide(&f.normals[c], i), out.side[i]);
-            let weight = out.weights[c][i];
-            let below = dot(sub(p, wide(&f.corners[c], i)), n).min(0.0);
-            for k in 0..3 {
-                sum[k] += weight * n[k];
-                lift[k] += weight * below * n[k];
-            }
-        }
-        let length = dot(sum, sum).sqrt();
-        // Normals that cancel say nothing.
-        let usable = f.smooth[i] & (length > 1e-6);
-        let facing = dot(sum, ng) >= 0.0;
-        let inv = if facing { 1.0 / length } else { -1.0 / length };
-        let lifts = usable & facing;
-        for k in 0..3 {
-            out.ns[k][i] = if usable { sum[k] * inv } else { ng[k] };
-            out.lifted[k][i] = if lifts { p[k] - lift[k] } else { p[k] };
-        }
+    #[inline(always)]
+    fn run(self) {
+        leave(self.points, self.block);
     }
 }
 
 /// Origins of the rays that leave on the ray's side ([`geom::offset_origin`](crate::geom::offset_origin)
 /// for all lanes), and everything into the block.
 #[inline(always)]
-fn leave(r: &Refined, b: &mut Block) {
+pub fn leave(r: &Points, b: &mut Block) {
     for i in 0..LANES {
         let (p, ng) = (get(&r.lifted, i), get(&r.ng, i));
         let delta = 4.0 * EPS * (p[0].abs().max(p[1].abs()).max(p[2].abs()) + r.extent[i]);
@@ -468,49 +315,6 @@ fn round_away(x: f64, side: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::{offset_origin, triangle};
-    use proptest::prelude::*;
-
-    fn vec(scale: f32) -> impl Strategy<Value = Vec3> {
-        [-1f32..1.0, -1f32..1.0, -1f32..1.0].prop_map(move |v| Vec3::from(v) * scale)
-    }
-
-    proptest! {
-        /// The lanes give the very numbers of the plain formulas.
-        #[test]
-        fn lanes_are_the_scalar_formulas(
-            corners in [vec(1.0), vec(1.0), vec(1.0)], inside in (0.01f32..0.5, 0.01f32..0.5), o in vec(5.0), far in 0.5f32..4.0,
-        ) {
-            let at = corners[0] + (corners[1] - corners[0]) * inside.0 + (corners[2] - corners[0]) * inside.1;
-            let ray = Ray::new(o, (at - o) * far);
-            prop_assume!((corners[1] - corners[0]).cross(corners[2] - corners[0]).length() > 1e-3);
-            let mut facets = Facets::EMPTY;
-            for lane in 0..LANES {
-                for k in 0..3 {
-                    facets.o[k][lane] = ray.o[k];
-                    facets.d[k][lane] = ray.d[k];
-                    for c in 0..3 {
-                        facets.corners[c][k][lane] = corners[c][k];
-                    }
-                }
-            }
-            let want = triangle::refine(ray.o, ray.d, corners, (0.3, 0.3));
-            let side = if want.ng.dot(ray.d.as_dvec3()) < 0.0 { 1.0 } else { -1.0 };
-            for level in simd::Level::ALL {
-                let mut block = Block::EMPTY;
-                simd::run_at(level, Finish { facets: &facets, block: &mut block });
-                for lane in [0, 7, 15] {
-                    prop_assert_eq!(Block::dvec3(&block.p, lane), want.p);
-                    prop_assert_eq!(block.extent[lane], want.extent);
-                    prop_assert_eq!(block.entering[lane], side > 0.0);
-                    let ng = Block::dvec3(&block.ng, lane);
-                    prop_assert!((ng - want.ng.normalize() * side).length() < 1e-15);
-                    prop_assert_eq!(block.ns, block.ng);
-                    prop_assert_eq!(Block::vec3(&block.front, lane), offset_origin(want.p, ng, want.extent));
-                }
-            }
-        }
-    }
 
     #[test]
     fn rounding_leaves_no_point_on_the_wrong_side() {

@@ -1,18 +1,24 @@
 //! One pixel told in words: every ray of its first sample and what became of it.
 
-use super::block::Block;
+use super::block::{Block, Path};
+use super::contacts::Contacts;
 use super::job::Job;
+use super::lights::{self, Lit, Target};
+use super::media::Media;
+use super::shade;
 use super::surface::SurfacePoint;
 use super::tile::Segment;
-use super::{lights, shade};
 use crate::backend::{AnyBackend, Backend};
-use crate::geom::{Coherence, LANES, PacketBatch, Ray, RayPacket};
-use crate::scene::{CameraDesc, Scene};
+use crate::geom::{Coherence, Hit, LANES, PacketBatch, Ray, RayPacket};
+use crate::scene::{CameraDesc, Light, Scene};
 use glam::{DVec3, Vec3};
 use std::fmt::Write;
 
 /// Rays told before the rest is only counted.
 const MOST_RAYS: usize = 500;
+
+/// Deeper rays are not moved further to the right.
+const MOST_INDENT: usize = 40;
 
 /// The ray tree of pixel `(x, y)`, one ray a line, deeper ones indented; points and
 /// distances in world units.
@@ -40,54 +46,85 @@ struct Teller<'a, B> {
     job: &'a Job,
 }
 
+/// The pixel and what its rays have in common.
+struct Told<'a> {
+    segment: Segment<'a>,
+    seen_from: Option<DVec3>,
+    clip: Option<(f64, f64)>,
+    contacts: Contacts,
+    media: Media,
+    out: String,
+}
+
 struct Pending {
     what: &'static str,
     ray: Ray,
-    depth: u32,
-    weight: Vec3,
+    path: Path,
 }
 
 impl<B: Backend> Teller<'_, B> {
     fn tell(&self, camera: &CameraDesc, x: u32, y: u32) -> Result<String, String> {
         let camera = camera.prepare(&self.scene.frame, self.job.size)?;
         let mut batch = PacketBatch::default();
-        Segment { pixels: &[(x, y)], first: 0, samples: 1 }.camera_rays(&camera, self.job, &mut batch);
+        let segment = Segment { pixels: &[(x, y)], first: 0, samples: 1 };
+        segment.camera_rays(&camera, self.job, &mut batch);
         let ray = batch.packets()[0].ray.get(0);
+        let mut told = Told {
+            segment,
+            seen_from: self.scene.course_rules.then_some(camera.eye),
+            clip: camera.clip,
+            contacts: Contacts::of(self.scene),
+            media: Media::new(),
+            out: String::new(),
+        };
         let mut out = format!("pixel {x},{y}\n");
-        let mut stack = vec![Pending { what: "camera", ray, depth: 0, weight: Vec3::ONE }];
-        let (mut told, mut color) = (0, Vec3::ZERO);
+        let mut stack = vec![Pending { what: "camera", ray, path: Path::of_sample(0) }];
+        let (mut count, mut color) = (0, Vec3::ZERO);
         while let Some(next) = stack.pop() {
-            told += 1;
-            let mut line = String::new();
-            color += self.one_ray(&next, &mut stack, &mut line);
-            if told <= MOST_RAYS {
-                out.push_str(&line);
+            count += 1;
+            told.out.clear();
+            color += self.one_ray(&next, &mut stack, &mut told);
+            if count <= MOST_RAYS {
+                out.push_str(&told.out);
             }
         }
-        if told > MOST_RAYS {
-            writeln!(out, "… and {} rays more", told - MOST_RAYS).expect("a string takes everything");
+        if count > MOST_RAYS {
+            writeln!(out, "… and {} rays more", count - MOST_RAYS).expect("a string takes everything");
         }
         writeln!(out, "colour {:.6} {:.6} {:.6} (linear)", color.x, color.y, color.z)
             .expect("a string takes everything");
         Ok(out)
     }
 
-    /// Tells one ray into `out`, puts its branches on the stack, returns what it adds.
-    fn one_ray(&self, this: &Pending, stack: &mut Vec<Pending>, out: &mut String) -> Vec3 {
-        let indent = "  ".repeat(this.depth as usize + 1);
-        let weight = this.weight.max_element();
-        let Some(hit) = self.backend.intersect(&this.ray) else {
-            let add = this.weight * self.scene.background;
-            *out += &format!("{indent}{} weight {weight:.4}: nothing hit, background adds {}\n", this.what, rgb(add));
+    /// What a ray meets, and how far away in scene units.
+    fn meet(&self, this: &Pending, clip: Option<(f64, f64)>) -> Option<(Hit, f64)> {
+        let hit = self.backend.intersect(&this.ray)?;
+        let far = this.ray.d.as_dvec3().length() * f64::from(hit.t);
+        let seen = this.path.depth > 0 || clip.is_none_or(|(near, far_end)| (near..=far_end).contains(&far));
+        seen.then_some((hit, far))
+    }
+
+    /// Tells one ray, puts its branches on the stack, returns what it adds.
+    fn one_ray(&self, this: &Pending, stack: &mut Vec<Pending>, told: &mut Told<'_>) -> Vec3 {
+        let indent = "  ".repeat((this.path.depth as usize).min(MOST_INDENT) + 1);
+        let met = self.meet(this, told.clip);
+        let distance = met.map_or(f64::INFINITY, |(_, far)| far);
+        let path = Path { weight: told.media.absorbed(&self.scene.materials, &this.path, distance), ..this.path };
+        let weight = path.weight.max_element();
+        let Some((hit, far)) = met else {
+            let add = path.weight * self.scene.background;
+            told.out +=
+                &format!("{indent}{} weight {weight:.4}: nothing hit, background adds {}\n", this.what, rgb(add));
             return add;
         };
-        let mut block = Block::single(self.scene, &this.ray, &hit);
+        let mut block = Block::single(self.scene, &this.ray, &hit, &path);
         let point = SurfacePoint::of_lane(&block, 0);
         let m = &self.scene.materials[point.material];
         let p = self.scene.frame.to_world(point.p);
-        let far = (point.p - this.ray.o.as_dvec3()).length() * self.scene.frame.world_per_local();
-        *out += &format!(
-            "{indent}{} weight {weight:.4}: object {} triangle {} '{}' at {:.9} {:.9} {:.9}, distance {far:.9}, normal {:.6} {:.6} {:.6}, {}\n",
+        let far = far * self.scene.frame.world_per_local();
+        let kind = if self.scene.objects[hit.geom_id as usize].mesh().is_some() { "triangle" } else { "shape" };
+        told.out += &format!(
+            "{indent}{} weight {weight:.4}: object {} {kind} {} '{}' at {:.9} {:.9} {:.9}, distance {far:.9}, normal {:.6} {:.6} {:.6}, {}\n",
             this.what,
             hit.geom_id,
             hit.prim_id,
@@ -100,49 +137,69 @@ impl<B: Backend> Teller<'_, B> {
             point.ns.z,
             if point.entering { "outside" } else { "inside" },
         );
-        let own = m.emission + m.ambient * self.scene.ambient;
-        *out += &format!("{indent}  ambient and emission: {}\n", rgb(this.weight * own));
-        let mut add = this.weight * own;
+        let own = path.weight * Block::vec3(&block.color, 0);
+        told.out += &format!("{indent}  ambient and emission: {}\n", rgb(own));
+        let mut add = own;
         for (i, light) in self.scene.lights.iter().enumerate() {
-            let mut batch = PacketBatch::<RayPacket>::default();
-            let (sent, facing_away) = lights::aim(&block, light, batch.push_packet());
-            if sent == 0 {
-                let why = if facing_away > 0 { "behind the surface" } else { "nothing to light" };
-                *out += &format!("{indent}  light {i}: {why}\n");
-                continue;
-            }
-            self.backend.occluded_many(&mut batch, Coherence::Coherent);
-            if batch.packets()[0].is_occluded(0) {
-                *out += &format!("{indent}  light {i}: in shadow\n");
-                continue;
-            }
-            block.color = [[0.0; LANES]; 3];
-            lights::add(&mut block, light, &batch.packets()[0]);
-            let lit = this.weight * Block::vec3(&block.color, 0);
-            *out += &format!("{indent}  light {i}: {}\n", rgb(lit));
-            add += lit;
+            add += self.light(i as u32, light, &mut block, &indent, told);
         }
-        self.branches(this, &point, stack, out, &indent);
+        self.branches(&path, &point, stack, told, &indent);
         add
     }
 
-    fn branches(&self, this: &Pending, point: &SurfacePoint, stack: &mut Vec<Pending>, out: &mut String, indent: &str) {
+    /// Tells about one light and returns what it adds.
+    fn light(&self, index: u32, light: &Light, block: &mut Block, indent: &str, told: &mut Told<'_>) -> Vec3 {
+        let rounds = if light.radius > 0.0 { self.job.light_samples.max(1) } else { 1 };
+        let (samples, sample) = told.segment.samples_of(0, self.job.seed);
+        let (mut sent, mut away, mut through) = (0, 0, 0.0);
+        for round in 0..rounds {
+            let mut batch = PacketBatch::<RayPacket>::default();
+            let points = lights::points_on(block, light, |lane| {
+                samples.on_light(sample * rounds + round, index, block.branch[lane])
+            });
+            let target = if light.radius > 0.0 { Target::Points(&points) } else { Target::Center };
+            let counts = lights::aim(block, light, target, batch.push_packet());
+            (sent, away) = (sent + counts.0, away + counts.1);
+            self.backend.occluded_many(&mut batch, Coherence::Coherent);
+            through += lights::unoccluded(&batch.packets()[0])[0];
+        }
+        let visible = through / rounds as f32;
+        if visible == 0.0 {
+            let why = match (sent, away) {
+                (0, 0) => "nothing to light",
+                (0, _) => "behind the surface",
+                _ => "in shadow",
+            };
+            told.out += &format!("{indent}  light {index}: {why}\n");
+            return Vec3::ZERO;
+        }
+        block.color = [[0.0; LANES]; 3];
+        lights::add(block, light, Lit { visible: &[visible; LANES], seen_from: told.seen_from });
+        let lit = Block::vec3(&block.weight, 0) * Block::vec3(&block.color, 0);
+        let part = if visible < 1.0 { format!(" ({:.0} % of it visible)", 100.0 * visible) } else { String::new() };
+        told.out += &format!("{indent}  light {index}: {}{part}\n", rgb(lit));
+        lit
+    }
+
+    fn branches(&self, path: &Path, point: &SurfacePoint, stack: &mut Vec<Pending>, told: &mut Told<'_>, indent: &str) {
         let m = &self.scene.materials[point.material];
         if !(m.reflects() || m.refracts()) {
             return;
         }
         let d: DVec3 = -point.to_eye.as_dvec3().normalize();
-        let (reflected, refracted) = shade::branches(m, point, d);
+        let sent = shade::onward(self.scene, &told.contacts, &mut told.media, point, path.medium, d);
         // The stack gives back the last first: the mirrored branch is told first.
-        for (what, branch) in [("refracted", refracted), ("reflected", reflected)] {
+        let ways = [("refracted", sent.refracted, 1, sent.behind), ("reflected", sent.reflected, 0, path.medium)];
+        for (what, branch, kind, medium) in ways {
             let Some(branch) = branch else { continue };
-            let weight = this.weight * branch.weight;
-            if this.depth >= self.job.k_max || weight.max_element() < self.job.min_weight {
-                *out += &format!("{indent}  {what} weight {:.6}: cut\n", weight.max_element());
+            let weight = path.weight * branch.weight;
+            if path.depth >= self.job.k_max || weight.max_element() < self.job.min_weight {
+                told.out += &format!("{indent}  {what} weight {:.6}: cut\n", weight.max_element());
                 continue;
             }
             let ray = Ray::new(point.origin_towards(branch.d), branch.d.as_vec3());
-            stack.push(Pending { what, ray, depth: this.depth + 1, weight });
+            let branch = path.branch.bounced(kind);
+            stack.push(Pending { what, ray, path: Path { depth: path.depth + 1, weight, branch, medium, ..*path } });
         }
     }
 }

@@ -89,6 +89,9 @@ pub struct RenderStats {
     pub cut_off_max: f64,
     /// Mean of the same over all pixels.
     pub cut_off_mean: f64,
+    /// The two above take the brightest surface of the image for the brightest there is: some
+    /// light gets arbitrarily strong near by.
+    pub cut_off_is_estimate: bool,
     /// Samples that came out NaN or infinite; they are left out of their pixel.
     pub non_finite_samples: u64,
     /// Shadow rays not sent because the light is behind the surface.

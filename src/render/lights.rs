@@ -2,38 +2,82 @@
 
 #![expect(clippy::needless_range_loop, reason = "an index runs over many arrays at once")]
 
-use super::block::{Block, F32};
+use super::block::{Block, F32, F64};
 use crate::geom::{LANES, RayPacket};
-use crate::math::pow01;
+use crate::math::{concentric_disc, pow01};
 use crate::scene::Light;
 use crate::simd::{self, Kernel};
+use glam::DVec3;
 
 /// End of a shadow ray that was sent at a light: just short of it.
 const BEFORE_THE_LIGHT: f32 = 1.0 - 4.0 * 0.5 * f32::EPSILON;
 
-/// Shadow rays of a block: `t_far` is minus infinity in the lanes that need none. Tells how
-/// many do, and how many were left out because the surface faces away.
-pub fn aim(block: &Block, light: &Light, packet: &mut RayPacket) -> (u32, u32) {
-    simd::run(Aim { block, light, packet })
+/// Points of a light that the lanes of a block look at.
+#[derive(Clone, Copy, Debug)]
+pub enum Target<'a> {
+    /// Its middle.
+    Center,
+    /// One for each lane.
+    Points(&'a [F64; 3]),
 }
 
-/// Adds the light to the lanes of `block` whose shadow rays got through.
-pub fn add(block: &mut Block, light: &Light, packet: &RayPacket) {
-    // Nothing shines here: no power to take.
-    if block.specular.iter().flatten().all(|&s| s == 0.0) {
-        simd::run(Add::<false> { block, light, packet });
-    } else {
-        simd::run(Add::<true> { block, light, packet });
+/// How shadow rays went, and where highlights are seen from.
+#[derive(Clone, Copy, Debug)]
+pub struct Lit<'a> {
+    /// Unoccluded share of the light for each lane.
+    pub visible: &'a F32,
+    /// Highlights are seen from this point; `None`: from where the ray came.
+    pub seen_from: Option<DVec3>,
+}
+
+/// Shadow rays of a block: `t_far` is minus infinity in the lanes that need none. Tells how
+/// many do, and how many were left out because the surface faces away.
+pub fn aim(block: &Block, light: &Light, target: Target<'_>, packet: &mut RayPacket) -> (u32, u32) {
+    match target {
+        Target::Center => simd::run(Aim::<false> { block, light, points: &[[0.0; LANES]; 3], packet }),
+        Target::Points(points) => simd::run(Aim::<true> { block, light, points, packet }),
     }
 }
 
-struct Aim<'a> {
+/// 1 in the lanes whose rays got through, else 0.
+#[inline]
+#[must_use]
+pub fn unoccluded(packet: &RayPacket) -> F32 {
+    packet.t_far.map(|t| if t != f32::NEG_INFINITY { 1.0 } else { 0.0 })
+}
+
+/// Adds the light to the lanes of `block` as far as it is visible from there.
+pub fn add(block: &mut Block, light: &Light, lit: Lit<'_>) {
+    let view = match lit.seen_from {
+        None => block.to_eye,
+        Some(eye) => towards(block, eye),
+    };
+    // Nothing shines here: no power to take.
+    if block.specular.iter().flatten().all(|&s| s == 0.0) {
+        simd::run(Add::<false> { block, light, visible: lit.visible, view: &view });
+    } else {
+        simd::run(Add::<true> { block, light, visible: lit.visible, view: &view });
+    }
+}
+
+/// Unit vectors from the points of a block to one point.
+fn towards(b: &Block, to: DVec3) -> [F32; 3] {
+    let mut view = [[0.0; LANES]; 3];
+    for i in 0..LANES {
+        let v = (to - Block::dvec3(&b.p, i)).normalize_or_zero();
+        (view[0][i], view[1][i], view[2][i]) = v.as_vec3().into();
+    }
+    view
+}
+
+struct Aim<'a, const POINTS: bool> {
     block: &'a Block,
     light: &'a Light,
+    points: &'a [F64; 3],
     packet: &'a mut RayPacket,
 }
 
-impl Kernel for Aim<'_> {
+impl<const POINTS: bool> Kernel for Aim<'_, POINTS> {
     type Output = (u32, u32);
 
     #[inline(always)]
@@ -43,16 +87,18 @@ impl Kernel for Aim<'_> {
         let (mut sent, mut away) = (0, 0);
         for i in 0..LANES {
             let to_light = [0, 1, 2].map(|k| l[k] - b.p[k][i]);
-            let along = |n: &[[f64; LANES]; 3]| n[0][i] * to_light[0] + n[1][i] * to_light[1] + n[2][i] * to_light[2];
+            let along = |n: &[[f64; LANES]; 3], to: [f64; 3]| n[0][i] * to[0] + n[1][i] * to[1] + n[2][i] * to[2];
             let answers = [0, 1, 2].map(|k| b.diffuse[k][i] + b.specular[k][i]);
             let live = (i < b.len) & (answers[0] + answers[1] + answers[2] > 0.0);
             // Dark for the facet is dark, whatever an interpolated normal says.
-            let lit = (along(&b.ng) > 0.0) & (along(&b.ns) > 0.0);
-            t_far[i] = if live & lit { BEFORE_THE_LIGHT } else { f32::NEG_INFINITY };
-            sent += u32::from(live & lit);
+            let lit = (along(&b.ng, to_light) > 0.0) & (along(&b.ns, to_light) > 0.0);
+            let end = if POINTS { [0, 1, 2].map(|k| self.points[k][i]) } else { l };
+            let above = !POINTS || along(&b.ng, [0, 1, 2].map(|k| end[k] - b.p[k][i])) > 0.0;
+            t_far[i] = if live & lit & above { BEFORE_THE_LIGHT } else { f32::NEG_INFINITY };
+            sent += u32::from(live & lit & above);
             away += u32::from(live & !lit);
             for k in 0..3 {
-                let to = (l[k] - f64::from(b.front[k][i])) as f32;
+                let to = (end[k] - f64::from(b.front[k][i])) as f32;
                 d[k][i] = if to.abs() < f32::MIN_POSITIVE { 0.0 } else { to };
             }
         }
@@ -72,7 +118,8 @@ impl Kernel for Aim<'_> {
 struct Add<'a, const SPECULAR: bool> {
     block: &'a mut Block,
     light: &'a Light,
-    packet: &'a RayPacket,
+    visible: &'a F32,
+    view: &'a [F32; 3],
 }
 
 impl<const SPECULAR: bool> Kernel for Add<'_, SPECULAR> {
@@ -80,18 +127,22 @@ impl<const SPECULAR: bool> Kernel for Add<'_, SPECULAR> {
 
     #[inline(always)]
     fn run(self) {
-        let (b, p) = (self.block, self.packet);
+        let (b, l) = (self.block, self.light.position.to_array());
+        let falloff = self.light.falloff;
         let (mut diffuse, mut specular) = ([0f32; LANES], [0f32; LANES]);
-        let mut visible = [0f32; LANES];
+        let mut strength = [0f32; LANES];
         let mut cos_h = [0f64; LANES];
         for i in 0..LANES {
-            let d = [p.d_x[i], p.d_y[i], p.d_z[i]];
-            let inv = 1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+            let d = [0, 1, 2].map(|k| (l[k] - f64::from(b.front[k][i])) as f32);
+            let square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).max(f32::MIN_POSITIVE);
+            let inv = 1.0 / square.sqrt();
             let n = [b.ns[0][i] as f32, b.ns[1][i] as f32, b.ns[2][i] as f32];
-            visible[i] = if p.t_far[i] != f32::NEG_INFINITY { 1.0 } else { 0.0 };
-            diffuse[i] = visible[i] * ((n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) * inv).max(0.0);
+            // At the very place of a light that weakens from there, as good as infinite is enough.
+            let arrives = falloff.map_or(1.0, |f| 1.0 / (f as f32 * square).max(f32::MIN_POSITIVE));
+            strength[i] = self.visible[i] * arrives;
+            diffuse[i] = strength[i] * ((n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) * inv).max(0.0);
             if SPECULAR {
-                let h = [0, 1, 2].map(|k| d[k] * inv + b.to_eye[k][i]);
+                let h = [0, 1, 2].map(|k| d[k] * inv + self.view[k][i]);
                 let inv = 1.0 / (h[0] * h[0] + h[1] * h[1] + h[2] * h[2]).sqrt().max(1e-15);
                 cos_h[i] = f64::from(((n[0] * h[0] + n[1] * h[1] + n[2] * h[2]) * inv).clamp(0.0, 1.0));
             }
@@ -99,7 +150,7 @@ impl<const SPECULAR: bool> Kernel for Add<'_, SPECULAR> {
         if SPECULAR {
             let power: [f64; LANES] = powers(&cos_h, &b.shininess);
             for i in 0..LANES {
-                specular[i] = visible[i] * power[i] as f32;
+                specular[i] = strength[i] * power[i] as f32;
             }
         }
         for k in 0..3 {
@@ -111,6 +162,21 @@ impl<const SPECULAR: bool> Kernel for Add<'_, SPECULAR> {
             }
         }
     }
+}
+
+/// Points on the disc that a light with a size shows to each point of a block, from points of
+/// the unit square.
+pub fn points_on(block: &Block, light: &Light, square: impl Fn(usize) -> [f64; 2]) -> [F64; 3] {
+    let mut points = [[0.0; LANES]; 3];
+    for i in 0..block.len {
+        let to_light = (light.position - Block::dvec3(&block.p, i)).normalize_or(DVec3::Z);
+        let (across, up) = to_light.any_orthonormal_pair();
+        let [u, v] = square(i);
+        let disc = light.radius * concentric_disc(u, v);
+        let p = light.position + across * disc.x + up * disc.y;
+        (points[0][i], points[1][i], points[2][i]) = p.into();
+    }
+    points
 }
 
 /// Of every lane, lit or not: a choice in between would keep the loop from being vector code.
@@ -141,32 +207,51 @@ mod tests {
         Light::constant(position, Vec3::new(1.0, 2.0, 3.0))
     }
 
+    /// As a wave does it.
+    fn shine(b: &mut Block, light: &Light, seen_from: Option<DVec3>) -> Vec3 {
+        let mut packet = RayPacket::EMPTY;
+        aim(b, light, Target::Center, &mut packet);
+        let before = Block::vec3(&b.color, 0);
+        add(b, light, Lit { visible: &unoccluded(&packet), seen_from });
+        Block::vec3(&b.color, 0) - before
+    }
+
     #[test]
     fn blinn_phong_by_hand() {
-        let (mut b, mut packet) = (block(), RayPacket::EMPTY);
+        let mut b = block();
         let light = light(DVec3::new(6.0, 8.0, 0.0));
-        assert_eq!(aim(&b, &light, &mut packet), (1, 0));
-        let dull = {
-            let mut b = b.clone();
-            add(&mut b, &light, &packet);
-            Block::vec3(&b.color, 0)
-        };
+        let dull = shine(&mut b, &light, None);
         assert!((dull - Vec3::new(0.4, 0.4, 0.0)).length() < 1e-6);
         b.specular = [[0.5; LANES]; 3];
         b.shininess = [2.0; LANES];
-        add(&mut b, &light, &packet);
         // h halves the angle between light and +y: cos 2a = 0.8, (cos a)^2 = 0.9.
         let want = Vec3::new(0.4, 0.4, 0.0) + light.color * 0.45;
-        assert!((Block::vec3(&b.color, 0) - want).length() < 1e-6);
+        assert!((shine(&mut b, &light, None) - want).length() < 1e-6);
+        // Seen from where the mirrored light goes, h is the normal.
+        let want = Vec3::new(0.4, 0.4, 0.0) + light.color * 0.5;
+        assert!((shine(&mut b, &light, Some(DVec3::new(-3.0, 4.0, 0.0))) - want).length() < 1e-6);
+    }
+
+    #[test]
+    fn light_weakens_with_the_square_of_the_distance() {
+        let mut b = block();
+        let constant = light(DVec3::new(0.0, 4.0, 0.0));
+        let full = shine(&mut b, &constant, None);
+        let weak = shine(&mut b, &Light { falloff: Some(1.0), ..constant }, None);
+        assert!((weak * 16.0 - full).length() < 1e-6);
+        let in_larger_units = shine(&mut b, &Light { falloff: Some(4.0), ..constant }, None);
+        assert!((in_larger_units * 64.0 - full).length() < 1e-6);
+        let at_the_point = shine(&mut b, &Light { falloff: Some(1.0), ..light(DVec3::ZERO) }, None);
+        assert_eq!(at_the_point, Vec3::ZERO);
     }
 
     #[test]
     fn lanes_that_need_no_ray_send_none_and_stay_dark() {
         let (mut b, mut packet) = (block(), RayPacket::EMPTY);
+        let aim = |b: &Block, light: &Light, packet: &mut RayPacket| aim(b, light, Target::Center, packet);
         assert_eq!(aim(&b, &light(DVec3::NEG_Y), &mut packet), (0, 1));
         assert!(packet.t_far.iter().all(|&t| t == f32::NEG_INFINITY));
-        add(&mut b, &light(DVec3::NEG_Y), &packet);
-        assert_eq!(Block::vec3(&b.color, 0), Vec3::ZERO);
+        assert_eq!(shine(&mut b, &light(DVec3::NEG_Y), None), Vec3::ZERO);
         b.ns[1] = [-1.0; LANES];
         assert_eq!(aim(&b, &light(DVec3::Y), &mut packet), (0, 1), "either normal may say that it is dark");
         b.diffuse = [[0.0; LANES]; 3];
@@ -174,5 +259,19 @@ mod tests {
         assert_eq!(aim(&block(), &light(DVec3::Y), &mut packet), (1, 0));
         assert_eq!(packet.t_far[0], BEFORE_THE_LIGHT);
         assert!(packet.t_far[1..].iter().all(|&t| t == f32::NEG_INFINITY), "only one lane is in use");
+    }
+
+    #[test]
+    fn points_of_a_light_lie_on_the_disc_that_it_shows() {
+        let b = block();
+        let light = Light { radius: 0.5, ..light(DVec3::new(0.0, 3.0, 4.0)) };
+        for k in 0..100 {
+            let square = [f64::from(k % 10) / 10.0, f64::from(k / 10) / 10.0];
+            let points = points_on(&b, &light, |_| square);
+            let p = Block::dvec3(&points, 0) - light.position;
+            assert!(p.length() <= 0.5 + 1e-12 && p.dot(light.position).abs() < 1e-12, "{p}");
+            let mut packet = RayPacket::EMPTY;
+            assert_eq!(aim(&b, &light, Target::Points(&points), &mut packet), (1, 0));
+        }
     }
 }

@@ -2,11 +2,16 @@
 
 mod block;
 mod certificate;
+mod contacts;
 mod explain;
+mod facets;
 mod job;
 mod lights;
+mod media;
 pub mod optics;
+mod paint;
 mod shade;
+mod shapes;
 mod surface;
 mod tile;
 mod wave;
@@ -19,6 +24,7 @@ use crate::film::{Aov, AovImage, Film};
 use crate::geom::{Coherence, LANES, PacketBatch, RayHitPacket};
 use crate::scene::{Camera, CameraDesc, Needs, Scene};
 use certificate::Radiance;
+use contacts::Contacts;
 use glam::{DVec3, Vec3};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
@@ -78,10 +84,11 @@ struct Render<'a, B, const SECONDARY: bool> {
 struct Sum {
     film: Film,
     tally: Tally,
-    cut_max: f64,
+    /// As in [`Bound`](certificate::Bound).
+    cut_max: [f64; 2],
     /// One per tile, summed in the tiles' order at the end: the figure too is the same for
     /// any number of threads.
-    cut_of_tile: Vec<f64>,
+    cut_of_tile: Vec<[f64; 2]>,
     non_finite: u64,
 }
 
@@ -91,16 +98,17 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
         let crop = self.job.crop;
         let tiles = tile::tiles(crop);
         let radiance = Radiance::of(self.scene, &self.needs, self.job.k_max);
+        let contacts = if self.needs.refraction { Contacts::of(self.scene) } else { Contacts::default() };
         let sum = Mutex::new(Sum {
             film: Film::new(crop.x1 - crop.x0, crop.y1 - crop.y0, &self.job.aovs),
             tally: Tally::default(),
-            cut_max: 0.0,
-            cut_of_tile: vec![0.0; tiles.len()],
+            cut_max: [0.0; 2],
+            cut_of_tile: vec![[0.0; 2]; tiles.len()],
             non_finite: 0,
         });
         let next = AtomicUsize::new(0);
         rayon::broadcast(|_| {
-            let mut worker = TileWorker::new(self, &radiance);
+            let mut worker = TileWorker::new(self, &radiance, &contacts);
             while !self.control.is_cancelled() {
                 let index = next.fetch_add(1, Relaxed);
                 let Some(&tile) = tiles.get(index) else { break };
@@ -114,11 +122,14 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
         });
         let sum = sum.into_inner().unwrap_or_else(PoisonError::into_inner);
         let pixels = (sum.film.finished.max(1)) as f64;
+        let brightest = f64::from(sum.tally.brightest);
+        let in_all = |cut: &[f64; 2]| cut[0] + brightest * cut[1];
         let stats = RenderStats {
             seconds: started.elapsed().as_secs_f64(),
             rays: sum.tally.rays,
-            cut_off_max: sum.cut_max,
-            cut_off_mean: sum.cut_of_tile.iter().sum::<f64>() / pixels,
+            cut_off_max: in_all(&sum.cut_max),
+            cut_off_mean: sum.cut_of_tile.iter().map(in_all).sum::<f64>() / pixels,
+            cut_off_is_estimate: !radiance.is_proved() && sum.cut_max[1] > 0.0,
             non_finite_samples: sum.non_finite,
             shadow_rays_facing_away: sum.tally.facing_away,
             branches_below_cut: sum.tally.below_cut,
@@ -135,6 +146,7 @@ impl Tally {
         self.rays.refracted += o.rays.refracted;
         self.facing_away += o.facing_away;
         self.below_cut += o.below_cut;
+        self.brightest = self.brightest.max(o.brightest);
     }
 }
 
@@ -153,7 +165,7 @@ struct TileWorker<'a, B, const SECONDARY: bool> {
 #[derive(Clone, Copy, Debug, Default)]
 struct PixelSum {
     color: DVec3,
-    cut: f64,
+    cut: [f64; 2],
     counted: u32,
 }
 
@@ -169,8 +181,9 @@ struct FirstHits {
 }
 
 impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
-    fn new(render: &'a Render<'a, B, SECONDARY>, radiance: &'a Radiance) -> Self {
-        let waves = Waves::new(render.scene, render.backend, render.job, &render.needs, radiance);
+    fn new(render: &'a Render<'a, B, SECONDARY>, radiance: &'a Radiance, contacts: &'a Contacts) -> Self {
+        let waves =
+            Waves::new(render.scene, &render.camera, render.backend, render.job, &render.needs, radiance, contacts);
         Self {
             render,
             waves,
@@ -200,7 +213,7 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
             }
             let before = self.waves.tally.rays.total();
             segment.camera_rays(camera, job, &mut self.batch);
-            self.waves.trace(&mut self.batch, Coherence::Coherent);
+            self.waves.trace(&mut self.batch, &segment, Coherence::Coherent);
             self.add_up(first_pixel, &segment);
             if segment.first + segment.samples == job.spp {
                 first_pixel += segment.pixels.len();
@@ -225,7 +238,10 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
         }
         if SECONDARY {
             for (sum, cuts) in self.sums[first_pixel..].iter_mut().zip(gathered.cut.chunks_exact(samples)) {
-                sum.cut += cuts.iter().sum::<f64>();
+                for cut in cuts {
+                    sum.cut[0] += cut[0];
+                    sum.cut[1] += cut[1];
+                }
             }
         }
         if !self.first_hits.is_empty() {
@@ -252,7 +268,7 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
             sum.hits += 1;
             sum.depth += (point.p - packet.ray.get(lane).o.as_dvec3()).length() * scene.frame.world_per_local();
             sum.normal += point.ns;
-            sum.albedo += scene.materials[point.material].diffuse;
+            sum.albedo += point.albedo;
         }
     }
 
@@ -261,19 +277,21 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
         let (crop, spp) = (self.render.job.crop, self.render.job.spp);
         let width = sum.film.width as usize;
         let at = |(x, y): (u32, u32)| (y - crop.y0) as usize * width + (x - crop.x0) as usize;
-        let (mut counted, mut cut, mut cut_max) = (0, 0.0, 0f64);
+        let (mut counted, mut cut) = (0, [0.0; 2]);
         for (&xy, pixel) in self.pixels.iter().zip(&self.sums) {
             let color = if spp == 1 { pixel.color } else { pixel.color / f64::from(pixel.counted.max(1)) };
             sum.film.color[at(xy)] = color.as_vec3().to_array();
             counted += u64::from(pixel.counted);
             if SECONDARY {
-                cut += pixel.cut;
-                cut_max = cut_max.max(pixel.cut);
+                let ends = sum.cut_max.iter_mut().zip(&mut cut);
+                for ((max, total), own) in ends.zip(pixel.cut.map(|c| c / f64::from(spp))) {
+                    *max = max.max(own);
+                    *total += own;
+                }
             }
         }
         sum.non_finite += self.pixels.len() as u64 * u64::from(spp) - counted;
-        sum.cut_max = sum.cut_max.max(cut_max / f64::from(spp));
-        sum.cut_of_tile[index] = cut / f64::from(spp);
+        sum.cut_of_tile[index] = cut;
         for (&xy, pixel) in self.pixels.iter().zip(&self.first_hits) {
             sum.film.aovs.iter_mut().for_each(|image| pixel.write(image, at(xy), spp));
         }

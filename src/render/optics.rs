@@ -42,6 +42,21 @@ pub fn refract(d: DVec3, n: DVec3, eta: f64) -> Option<Refraction> {
     })
 }
 
+/// [`refract`] as the program behind the course scenes has it: with `c = -d·n` and `k` as above, the
+/// direction is that of `eta d - (eta c + sqrt(k)) n`, where Snell's law has `+ eta c`. It bends too
+/// far towards the normal, but the pictures of that program are only met with it: the edges seen
+/// through the pane of its scene `refraction` are where it put them within 0.02 pixels, else a pixel off.
+#[must_use]
+pub fn refract_as_course(d: DVec3, n: DVec3, eta: f64) -> Option<Refraction> {
+    let c = -d.dot(n);
+    let p = d + c * n;
+    let k = 1.0 - eta * eta * p.length_squared();
+    (k >= 0.0).then(|| {
+        let cos_t = k.sqrt();
+        Refraction { direction: (eta * p - (cos_t + 2.0 * eta * c) * n).normalize(), cos_t }
+    })
+}
+
 impl Refraction {
     /// Share of unpolarised light that the boundary mirrors; `cos_i = -d·n`, `eta` as for [`refract`].
     ///
@@ -101,6 +116,20 @@ mod tests {
                 let angle = got.direction.x.atan2(-got.direction.y).to_degrees();
                 assert!((angle - want).abs() < 1e-6, "{}: {angle} != {want}", c.name);
                 assert!((got.direction.length() - 1.0).abs() < 1e-15, "{}", c.name);
+            }
+        }
+    }
+
+    #[test]
+    fn the_course_bends_further_and_is_totally_reflected_alike() {
+        for (deg, eta) in [(30.0, 1.0 / 1.5), (60.0, 0.25), (30.0, 1.5), (41.9, 1.5)] {
+            let (snell, course) = (refract(down(deg), DVec3::Y, eta), refract_as_course(down(deg), DVec3::Y, eta));
+            assert_eq!(snell.is_some(), course.is_some(), "{deg}");
+            if let (Some(snell), Some(course)) = (snell, course) {
+                let (sin, cos) = deg.to_radians().sin_cos();
+                let straight = (1.0 - (eta * sin).powi(2)).sqrt() + 2.0 * eta * cos;
+                let (flat, steep) = (course.direction.x, -course.direction.y);
+                assert!((flat / steep - eta * sin / straight).abs() < 1e-14 && flat < snell.direction.x);
             }
         }
     }

@@ -1,8 +1,10 @@
 //! The branches that go on from a hit.
 
-use super::optics;
+use super::contacts::Contacts;
+use super::media::{Media, Medium};
+use super::optics::{self, Refraction};
 use super::surface::SurfacePoint;
-use crate::scene::{Material, Reflect};
+use crate::scene::{Material, Reflect, Scene};
 use glam::{DVec3, Vec3};
 
 /// A ray that goes on from a hit.
@@ -14,17 +16,68 @@ pub struct Branch {
     pub weight: Vec3,
 }
 
-/// The mirrored and the refracted branch of a hit; `d` is the unit direction of the ray.
+/// What goes on from a hit.
+#[derive(Clone, Copy, Debug)]
+pub struct Onward {
+    /// The mirrored branch, in the medium that the ray came through.
+    pub reflected: Option<Branch>,
+    /// The branch that passes.
+    pub refracted: Option<Branch>,
+    /// What that one travels in.
+    pub behind: Medium,
+}
+
+/// The branches of a hit; `d` is the unit direction of the ray, `medium` what it travelled in.
+#[must_use]
+pub fn onward(
+    scene: &Scene,
+    contacts: &Contacts,
+    media: &mut Media,
+    point: &SurfacePoint,
+    medium: Medium,
+    d: DVec3,
+) -> Onward {
+    let material = &scene.materials[point.material];
+    let dense = material.refracts() || material.reflect == Reflect::Fresnel;
+    // What neither bends nor absorbs fills no space: a sheet with holes, say.
+    let fills = material.ior != 1.0 || material.absorption != Vec3::ZERO;
+    if scene.course_rules {
+        let (reflected, refracted) = branches(material, point, d, 1.0 / material.ior, optics::refract_as_course);
+        return Onward { reflected, refracted, behind: medium };
+    }
+    let (eta, behind) = if !(dense && fills) {
+        (1.0, medium)
+    } else {
+        let (before, behind) = point.both_sides();
+        let also = contacts.crossed(scene, point.id, before, behind);
+        let crossing = media.cross(&scene.materials, medium, point.material as u32, point.entering, also.as_ref());
+        if crossing.hidden {
+            let refracted = Some(Branch { d, weight: Vec3::ONE });
+            return Onward { reflected: None, refracted, behind: crossing.behind };
+        }
+        (crossing.eta, crossing.behind)
+    };
+    let (reflected, refracted) = branches(material, point, d, eta, optics::refract);
+    Onward { reflected, refracted, behind }
+}
+
+/// The mirrored and the refracted branch of a hit; `d` is the unit direction of the ray, `eta`
+/// the index of refraction before the surface over that behind it, `refract` the law that bends.
 ///
 /// Under total internal reflection what would have been refracted is mirrored.
 #[must_use]
-pub fn branches(material: &Material, point: &SurfacePoint, d: DVec3) -> (Option<Branch>, Option<Branch>) {
+fn branches(
+    material: &Material,
+    point: &SurfacePoint,
+    d: DVec3,
+    eta: f64,
+    refract: impl Fn(DVec3, DVec3, f64) -> Option<Refraction>,
+) -> (Option<Branch>, Option<Branch>) {
     // A smooth normal may face away from the ray although the facet does not.
     let n = if point.ns.dot(d) < 0.0 { point.ns } else { point.ng };
     let cos_i = -n.dot(d);
-    let eta = if point.entering { 1.0 / material.ior } else { material.ior };
     let refraction =
-        if material.refracts() || material.reflect == Reflect::Fresnel { optics::refract(d, n, eta) } else { None };
+        if material.refracts() || material.reflect == Reflect::Fresnel { refract(d, n, eta) } else { None };
     let (mut mirrored, mut passed) = match material.reflect {
         Reflect::Constant(weight) => (weight, material.refract),
         Reflect::Metal(color) => (color + (Vec3::ONE - color) * optics::schlick(cos_i) as f32, material.refract),
@@ -68,7 +121,17 @@ mod tests {
     use super::*;
 
     fn point(entering: bool) -> SurfacePoint {
-        SurfacePoint { p: DVec3::ZERO, ng: DVec3::Y, ns: DVec3::Y, to_eye: Vec3::Y, extent: 1.0, material: 0, entering }
+        SurfacePoint {
+            p: DVec3::ZERO,
+            ng: DVec3::Y,
+            ns: DVec3::Y,
+            to_eye: Vec3::Y,
+            extent: 1.0,
+            albedo: Vec3::ONE,
+            id: [0; 2],
+            material: 0,
+            entering,
+        }
     }
 
     fn glass(reflect: Reflect) -> Material {
@@ -78,10 +141,10 @@ mod tests {
     #[test]
     fn total_reflection_adds_the_mirrored_ray() {
         let flat = DVec3::new(0.8, -0.6, 0.0);
-        let (r, t) = branches(&glass(Reflect::Constant(Vec3::splat(0.1))), &point(false), flat);
+        let (r, t) = branches(&glass(Reflect::Constant(Vec3::splat(0.1))), &point(false), flat, 1.5, optics::refract);
         assert!(t.is_none());
         assert!((r.expect("mirrored").weight - Vec3::ONE).length() < 1e-6);
-        let (r, t) = branches(&glass(Reflect::Fresnel), &point(false), flat);
+        let (r, t) = branches(&glass(Reflect::Fresnel), &point(false), flat, 1.5, optics::refract);
         assert!(t.is_none() && r.expect("mirrored").weight == Vec3::ONE);
     }
 
@@ -89,7 +152,7 @@ mod tests {
     fn fresnel_shares_add_up() {
         let clear = Material { refract: Vec3::ONE, ..glass(Reflect::Fresnel) };
         for (x, y) in [(0.0, 1.0), (0.6, 0.8), (0.96, 0.28)] {
-            let (r, t) = branches(&clear, &point(true), DVec3::new(x, -y, 0.0));
+            let (r, t) = branches(&clear, &point(true), DVec3::new(x, -y, 0.0), 1.0 / 1.5, optics::refract);
             let (r, t) = (r.expect("mirrored"), t.expect("refracted"));
             assert!((r.weight + t.weight - Vec3::ONE).length() < 1e-6);
             assert!((r.d - DVec3::new(x, y, 0.0)).length() < 1e-14);
@@ -101,7 +164,7 @@ mod tests {
     fn a_tilted_shading_normal_sends_no_ray_through_the_facet() {
         let tilted = SurfacePoint { ns: DVec3::new(0.6, 0.8, 0.0), ..point(true) };
         let d = DVec3::new(-0.9, -0.1, 0.0).normalize();
-        let (r, t) = branches(&glass(Reflect::Constant(Vec3::ONE)), &tilted, d);
+        let (r, t) = branches(&glass(Reflect::Constant(Vec3::ONE)), &tilted, d, 1.0 / 1.5, optics::refract);
         assert!(r.expect("mirrored").d.y > 0.0 && t.expect("refracted").d.y < 0.0);
     }
 }

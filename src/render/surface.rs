@@ -17,9 +17,13 @@ pub struct SurfacePoint {
     pub to_eye: Vec3,
     /// Size of the primitive, for offsets.
     pub extent: f64,
+    /// Diffuse colour, linear RGB.
+    pub albedo: Vec3,
+    /// Object and primitive.
+    pub id: [u32; 2],
     /// Index of the material.
     pub material: usize,
-    /// Whether the ray met the side that the winding calls outer.
+    /// Whether the ray met the side that the surface calls outer.
     pub entering: bool,
 }
 
@@ -34,9 +38,17 @@ impl SurfacePoint {
             ns: Block::dvec3(&block.ns, lane),
             to_eye: Block::vec3(&block.to_eye, lane),
             extent: block.extent[lane],
+            albedo: Block::vec3(&block.diffuse, lane),
+            id: block.id[lane],
             material: block.material[lane] as usize,
             entering: block.entering[lane],
         }
+    }
+
+    /// Points just before the surface and just behind it, as far off as rays start.
+    #[must_use]
+    pub fn both_sides(&self) -> (DVec3, DVec3) {
+        [self.ng, -self.ng].map(|n| offset_origin(self.p, n, self.extent).as_dvec3()).into()
     }
 
     /// Where a ray starts that leaves along `w` on its side of the facet.

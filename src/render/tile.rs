@@ -2,7 +2,8 @@
 
 use super::job::{Crop, Job};
 use crate::geom::{LANES, PacketBatch, RayHitPacket};
-use crate::math::{PixelSamples, concentric_disc};
+use crate::math::{PixelSamples, concentric_disc, polar_disc, rejection_disc, uniform_radius_disc};
+use crate::scene::desc::LensSampler;
 use crate::scene::{Camera, CameraRays};
 use crate::simd;
 use glam::DVec2;
@@ -83,6 +84,14 @@ pub fn segments(pixels: &[(u32, u32)], spp: u32) -> impl Iterator<Item = Segment
 }
 
 impl Segment<'_> {
+    /// The sample points of the pixel that ray `slot` of the segment goes through, and which of
+    /// them is the ray's.
+    #[must_use]
+    pub fn samples_of(&self, slot: u32, seed: u32) -> (PixelSamples, u32) {
+        let (x, y) = self.pixels[(slot / self.samples) as usize];
+        (PixelSamples::new(x, y, seed), self.first + slot % self.samples)
+    }
+
     /// Fills `batch` with the camera rays.
     pub fn camera_rays(&self, camera: &Camera, job: &Job, batch: &mut PacketBatch<RayHitPacket>) {
         batch.resize(self.pixels.len() * self.samples as usize);
@@ -108,10 +117,28 @@ fn image_point(camera: &Camera, job: &Job, pixel: (u32, u32), sample: u32) -> (f
     if job.spp == 1 && camera.lens.is_none() {
         return (x + lone.0, y + lone.1, DVec2::ZERO);
     }
-    let [a, b, u, v] = PixelSamples::new(pixel.0, pixel.1, job.seed).point(sample).map(f64::from);
-    let (dx, dy) = if job.spp == 1 { lone } else { (a, b) };
-    let disc = if camera.lens.is_some() { concentric_disc(u, v) } else { DVec2::ZERO };
+    let samples = PixelSamples::new(pixel.0, pixel.1, job.seed);
+    let [a, b, u, v] = samples.point(sample).map(f64::from);
+    let spread = |a: f64| 0.5 + 2.0 * job.jitter_radius * (a - 0.5);
+    let (dx, dy) = if job.spp == 1 { lone } else { (spread(a), spread(b)) };
+    let disc = if camera.lens.is_some() { on_lens(job.lens_sampler, samples, sample, [u, v]) } else { DVec2::ZERO };
     (x + dx, y + dy, disc)
+}
+
+/// A point of the unit disc by the sampler that was asked for.
+fn on_lens(sampler: LensSampler, samples: PixelSamples, sample: u32, [u, v]: [f64; 2]) -> DVec2 {
+    match sampler {
+        LensSampler::Concentric => concentric_disc(u, v),
+        LensSampler::Polar => polar_disc(u, v),
+        LensSampler::PolarUniformRadius => uniform_radius_disc(u, v),
+        LensSampler::Rejection => {
+            let mut number = 0;
+            rejection_disc([u, v], || {
+                number += 1;
+                samples.beyond(sample, number)
+            })
+        }
+    }
 }
 
 #[cfg(test)]

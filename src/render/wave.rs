@@ -1,21 +1,31 @@
 //! Waves of rays: a segment of camera rays, their shadow rays, and whatever they send on,
 //! without recursion.
 
-use super::block::{Block, Facets, Paint, Path};
-use super::certificate::Radiance;
+use super::block::{Block, F32, Hits, Path};
+use super::certificate::{Bound, Radiance};
+use super::contacts::Contacts;
+use super::facets::Facets;
 use super::job::{Job, RayCounts};
-use super::lights;
+use super::lights::{self, Lit, Target};
+use super::media::{Media, Medium};
+use super::paint::Palette;
 use super::shade::{self, Branch};
+use super::shapes::ShapeHits;
 use super::surface::SurfacePoint;
+use super::tile::Segment;
 use crate::backend::Backend;
 use crate::film::Aov;
 use crate::geom::{Coherence, INVALID_ID, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
-use crate::scene::{Light, Needs, Scene};
+use crate::scene::{Camera, Light, Needs, Object, Scene};
 use glam::{DVec3, Vec3};
 
 /// Most secondary rays worked on at once; the rest waits, newest first, so that memory is
 /// bounded by depth and not by the number of branches.
 const MOST_AT_ONCE: usize = 1 << 14;
+
+/// Once so many wait, only a packet's worth is worked on at once: each bounce then leaves at
+/// most that many more waiting, however deep the recursion may go.
+const MANY_WAITING: usize = 1 << 19;
 
 /// A secondary ray that waits for its turn.
 #[derive(Clone, Copy, Debug)]
@@ -29,8 +39,8 @@ struct Waiting {
 pub struct Gathered {
     /// Linear RGB.
     pub color: Vec<DVec3>,
-    /// Bound on what was left out by the weight cut and `k_max`, linear.
-    pub cut: Vec<f64>,
+    /// Bound on what was left out by the weight cut and `k_max`, linear: `(fixed, scaled)` as in [`Bound`].
+    pub cut: Vec<[f64; 2]>,
     /// Rays sent for it, of all kinds; kept only if somebody asked.
     pub cost: Option<Vec<u32>>,
     /// The hits of the camera rays with their samples, in order; kept only if somebody asked.
@@ -46,6 +56,8 @@ pub struct Tally {
     pub facing_away: u64,
     /// Branches below the weight cut.
     pub below_cut: u64,
+    /// Largest answer of a surface to all lights; kept only where a bound needs it.
+    pub brightest: f32,
 }
 
 /// The integrator of one thread: its scene, and buffers that are refilled and never freed.
@@ -56,19 +68,33 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
     backend: &'a B,
     job: &'a Job,
     radiance: &'a Radiance,
+    contacts: &'a Contacts,
     /// The lights that can change anything.
     lights: Vec<Light>,
-    /// Of each material.
-    paints: Vec<Paint>,
+    /// Where highlights are seen from at every depth; `None`: from where each ray came.
+    seen_from: Option<DVec3>,
+    clip: Option<(f64, f64)>,
+    palette: Palette,
     /// Of each material: whether it sends rays on.
     branching: Vec<bool>,
-    facets: Box<Facets>,
+    /// Of each object: whether it is a set of shapes.
+    is_shapes: Vec<bool>,
+    /// Whether there are both shapes and meshes.
+    is_mixed: bool,
+    absorbs: bool,
+    /// Absent where there are no meshes, and while in use.
+    facets: Option<Box<Facets>>,
+    /// Likewise for shapes.
+    shape_hits: Option<Box<ShapeHits>>,
     blocks: Vec<Block>,
     /// Blocks in use.
     used: usize,
     shadows: PacketBatch<RayPacket>,
     /// The block of each shadow packet.
     shadowed: Vec<u32>,
+    /// Unoccluded share of a light with a size, for each block.
+    visible: Vec<F32>,
+    media: Media,
     waiting: Vec<Waiting>,
     /// What the current segment gathers.
     pub gathered: Gathered,
@@ -78,38 +104,58 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
 
 impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     /// An integrator with empty buffers.
-    pub fn new(scene: &'a Scene, backend: &'a B, job: &'a Job, needs: &Needs, radiance: &'a Radiance) -> Self {
+    pub fn new(
+        scene: &'a Scene,
+        camera: &Camera,
+        backend: &'a B,
+        job: &'a Job,
+        needs: &Needs,
+        radiance: &'a Radiance,
+        contacts: &'a Contacts,
+    ) -> Self {
         let cost = job.aovs.contains(&Aov::Cost).then(Vec::new);
         let seen = job.aovs.iter().any(|&a| a != Aov::Cost).then(Vec::new);
         let lights = scene.lights.iter().filter(|l| needs.shadow_rays && l.color != Vec3::ZERO);
+        let is_shapes: Vec<bool> = scene.objects.iter().map(|o| matches!(o, Object::Shapes(_))).collect();
         Self {
             scene,
             backend,
             job,
             radiance,
+            contacts,
             lights: lights.copied().collect(),
-            paints: scene.materials.iter().map(|m| Paint::new(m, scene.ambient)).collect(),
+            seen_from: scene.course_rules.then_some(camera.eye),
+            clip: camera.clip,
+            palette: Palette::of(scene),
             branching: scene.materials.iter().map(|m| m.reflects() || m.refracts()).collect(),
-            facets: Box::new(Facets::EMPTY),
+
+            absorbs: needs.absorption,
+            facets: is_shapes.contains(&false).then(|| Box::new(Facets::EMPTY)),
+            shape_hits: is_shapes.contains(&true).then(Box::default),
+            is_mixed: is_shapes.contains(&false) && is_shapes.contains(&true),
+            is_shapes,
             blocks: Vec::new(),
             used: 0,
             shadows: PacketBatch::default(),
             shadowed: Vec::new(),
+            visible: Vec::new(),
+            media: Media::new(),
             waiting: Vec::new(),
             gathered: Gathered { cost, seen, ..Gathered::default() },
             tally: Tally::default(),
         }
     }
 
-    /// Traces camera rays, one per sample, to the end of every branch. `batch` holds their
-    /// answers afterwards; what they gathered is in `gathered`.
-    pub fn trace(&mut self, batch: &mut PacketBatch<RayHitPacket>, coherence: Coherence) {
+    /// Traces the camera rays of `segment`, one per sample, to the end of every branch. `batch`
+    /// holds their answers afterwards; what they gathered is in `gathered`.
+    pub fn trace(&mut self, batch: &mut PacketBatch<RayHitPacket>, segment: &Segment<'_>, coherence: Coherence) {
         let samples = batch.len();
         self.gathered.color.clear();
         self.gathered.color.resize(samples, DVec3::ZERO);
         if SECONDARY {
             self.gathered.cut.clear();
-            self.gathered.cut.resize(samples, 0.0);
+            self.gathered.cut.resize(samples, [0.0; 2]);
+            self.media.forget();
         }
         if let Some(cost) = &mut self.gathered.cost {
             cost.clear();
@@ -117,6 +163,9 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         }
         self.tally.rays.camera += samples as u64;
         self.backend.intersect_many(batch, coherence);
+        if let Some(range) = self.clip {
+            batch.packets_mut().for_each(|(packet, live)| clip(packet, live, range));
+        }
         self.collect(batch, |i| Path::of_sample(i as u32));
         if let Some(seen) = &mut self.gathered.seen {
             seen.clear();
@@ -124,17 +173,18 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
                 seen.extend((0..block.len).map(|lane| (block.slot[lane], SurfacePoint::of_lane(block, lane))));
             }
         }
-        self.shade();
+        self.shade(segment);
         if SECONDARY {
-            self.secondary_waves();
+            self.secondary_waves(segment);
         }
     }
 
-    fn secondary_waves(&mut self) {
+    fn secondary_waves(&mut self, segment: &Segment<'_>) {
         let mut batch = PacketBatch::<RayHitPacket>::default();
         let mut paths = Vec::new();
         while !self.waiting.is_empty() {
-            let newest = self.waiting.len().saturating_sub(MOST_AT_ONCE);
+            let at_once = if self.waiting.len() < MANY_WAITING { MOST_AT_ONCE } else { LANES };
+            let newest = self.waiting.len().saturating_sub(at_once);
             batch.clear();
             paths.clear();
             for w in self.waiting.drain(newest..) {
@@ -143,47 +193,89 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             }
             self.backend.intersect_many(&mut batch, Coherence::Incoherent);
             self.collect(&batch, |i| paths[i]);
-            self.shade();
+            self.shade(segment);
         }
     }
 
     /// Misses take the background, hits fill blocks.
     fn collect(&mut self, batch: &PacketBatch<RayHitPacket>, path: impl Fn(usize) -> Path) {
         self.used = 0;
+        self.misses(batch, &path);
+        if let Some(mut hits) = self.facets.take() {
+            self.fill_blocks(&mut *hits, batch, false, &path);
+            self.facets = Some(hits);
+        }
+        if let Some(mut hits) = self.shape_hits.take() {
+            self.fill_blocks(&mut *hits, batch, true, &path);
+            self.shape_hits = Some(hits);
+        }
+    }
+
+    fn misses(&mut self, batch: &PacketBatch<RayHitPacket>, path: &impl Fn(usize) -> Path) {
+        for (k, packet) in batch.packets().iter().enumerate() {
+            let live = (batch.len() - k * LANES).min(LANES);
+            for i in (0..live).filter(|&i| packet.hit.geom_id[i] == INVALID_ID) {
+                let path = path(k * LANES + i);
+                let weight = if self.absorbs {
+                    self.media.absorbed(&self.scene.materials, &path, f64::INFINITY)
+                } else {
+                    path.weight
+                };
+                self.gathered.color[path.slot as usize] += (weight * self.scene.background).as_dvec3();
+            }
+        }
+    }
+
+    /// Fills blocks with the hits of shapes, or those of meshes.
+    fn fill_blocks<H: Hits>(
+        &mut self,
+        hits: &mut H,
+        batch: &PacketBatch<RayHitPacket>,
+        shapes: bool,
+        path: &impl Fn(usize) -> Path,
+    ) {
         let mut lane = 0;
         for (k, packet) in batch.packets().iter().enumerate() {
             let live = (batch.len() - k * LANES).min(LANES);
             for i in 0..live {
-                let path = path(k * LANES + i);
-                if packet.hit.geom_id[i] == INVALID_ID {
-                    self.gathered.color[path.slot as usize] += (path.weight * self.scene.background).as_dvec3();
+                let geom = packet.hit.geom_id[i];
+                if geom == INVALID_ID || (self.is_mixed && self.is_shapes[geom as usize] != shapes) {
                     continue;
+                }
+                let mut path = path(k * LANES + i);
+                if self.absorbs {
+                    path.weight = self.media.absorbed(&self.scene.materials, &path, distance(packet, i));
                 }
                 if self.used == self.blocks.len() {
                     self.blocks.push(Block::EMPTY);
                 }
-                self.facets.set(lane, packet, i);
+                hits.set(lane, packet, i);
                 self.blocks[self.used].set(lane, &path);
+                self.blocks[self.used].id[lane] = [geom, packet.hit.prim_id[i]];
                 lane += 1;
                 if lane == LANES {
-                    self.finish_block(lane);
+                    hits.finish(lane, self.scene, &self.palette, &mut self.blocks[self.used]);
+                    self.used += 1;
                     lane = 0;
                 }
             }
         }
         if lane > 0 {
-            self.finish_block(lane);
+            hits.finish(lane, self.scene, &self.palette, &mut self.blocks[self.used]);
+            self.used += 1;
         }
     }
 
-    fn finish_block(&mut self, len: usize) {
-        self.blocks[self.used].finish(self.scene, &mut self.facets, len, &self.paints);
-        self.used += 1;
-    }
-
-    fn shade(&mut self) {
+    fn shade(&mut self, segment: &Segment<'_>) {
         for index in 0..self.lights.len() {
-            self.light(index);
+            if self.lights[index].radius > 0.0 {
+                self.soft_light(index, segment);
+            } else {
+                self.light(index);
+            }
+        }
+        if SECONDARY && !self.radiance.is_proved() {
+            self.note_brightest();
         }
         for block in &self.blocks[..self.used] {
             for lane in 0..block.len {
@@ -196,14 +288,63 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         }
     }
 
+    fn note_brightest(&mut self) {
+        for block in &self.blocks[..self.used] {
+            let brightest = block.color.iter().flat_map(|c| &c[..block.len]).copied().fold(0.0, f32::max);
+            if brightest.is_finite() {
+                self.tally.brightest = self.tally.brightest.max(brightest);
+            }
+        }
+    }
+
     /// Adds one light to all blocks: its shadow rays go out as one batch.
     fn light(&mut self, index: usize) {
         let light = self.lights[index];
+        self.send_shadow_rays(|_, block, packet| lights::aim(block, &light, Target::Center, packet));
+        for (packet, &i) in self.shadows.packets().iter().zip(&self.shadowed) {
+            let lit = Lit { visible: &lights::unoccluded(packet), seen_from: self.seen_from };
+            lights::add(&mut self.blocks[i as usize], &light, lit);
+        }
+    }
+
+    /// Adds one light that has a size: a batch for each of its samples, and the share of them
+    /// that got through.
+    fn soft_light(&mut self, index: usize, segment: &Segment<'_>) {
+        let (light, rounds, seed) = (self.lights[index], self.job.light_samples.max(1), self.job.seed);
+        self.visible.clear();
+        self.visible.resize(self.used, [0.0; LANES]);
+        for round in 0..rounds {
+            self.send_shadow_rays(|_, block, packet| {
+                let points = lights::points_on(block, &light, |lane| {
+                    let (samples, sample) = segment.samples_of(block.slot[lane], seed);
+                    let number = sample.wrapping_mul(rounds).wrapping_add(round);
+                    samples.on_light(number, index as u32, block.branch[lane])
+                });
+                lights::aim(block, &light, Target::Points(&points), packet)
+            });
+            for (packet, &i) in self.shadows.packets().iter().zip(&self.shadowed) {
+                for (sum, through) in self.visible[i as usize].iter_mut().zip(lights::unoccluded(packet)) {
+                    *sum += through;
+                }
+            }
+        }
+        let share = 1.0 / rounds as f32;
+        for (block, visible) in self.blocks[..self.used].iter_mut().zip(&self.visible) {
+            if visible.iter().any(|&v| v > 0.0) {
+                let visible = visible.map(|v| v * share);
+                lights::add(block, &light, Lit { visible: &visible, seen_from: self.seen_from });
+            }
+        }
+    }
+
+    /// Sends the shadow rays that `aim` makes for each block; `shadows` then holds the answers,
+    /// `shadowed` the blocks they are for.
+    fn send_shadow_rays(&mut self, aim: impl Fn(usize, &Block, &mut RayPacket) -> (u32, u32)) {
         self.shadows.clear();
         self.shadowed.clear();
         for (i, block) in self.blocks[..self.used].iter().enumerate() {
             let packet = self.shadows.push_packet();
-            let (sent, facing_away) = lights::aim(block, &light, packet);
+            let (sent, facing_away) = aim(i, block, packet);
             self.tally.facing_away += u64::from(facing_away);
             self.tally.rays.shadow += u64::from(sent);
             if sent == 0 {
@@ -217,9 +358,6 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             }
         }
         self.backend.occluded_many(&mut self.shadows, Coherence::Coherent);
-        for (packet, &i) in self.shadows.packets().iter().zip(&self.shadowed) {
-            lights::add(&mut self.blocks[i as usize], &light, packet);
-        }
     }
 
     /// Sends on the mirrored and refracted branches of all blocks.
@@ -227,31 +365,34 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         let blocks = std::mem::take(&mut self.blocks);
         for block in &blocks[..self.used] {
             for lane in 0..block.len {
-                if !self.branching[block.material[lane] as usize] {
-                    continue;
-                }
-                let weight = Block::vec3(&block.weight, lane);
-                let path = Path { slot: block.slot[lane], depth: block.depth[lane], weight };
-                let material = &self.scene.materials[block.material[lane] as usize];
-                if path.depth >= self.job.k_max {
-                    let most = weight.max_element() * material.passed_on();
-                    self.gathered.cut[path.slot as usize] += f64::from(most) * f64::from(self.radiance.beyond());
-                    continue;
-                }
-                let point = SurfacePoint::of_lane(block, lane);
-                let d = -point.to_eye.as_dvec3().normalize();
-                let (reflected, refracted) = shade::branches(material, &point, d);
-                if let Some(b) = reflected.and_then(|b| self.worth_sending(&path, &b)) {
-                    self.tally.rays.reflected += 1;
-                    self.send(b, &path, &point);
-                }
-                if let Some(b) = refracted.and_then(|b| self.worth_sending(&path, &b)) {
-                    self.tally.rays.refracted += 1;
-                    self.send(b, &path, &point);
+                if self.branching[block.material[lane] as usize] {
+                    self.branch_lane(block, lane);
                 }
             }
         }
         self.blocks = blocks;
+    }
+
+    fn branch_lane(&mut self, block: &Block, lane: usize) {
+        let path = block.path(lane);
+        let index = block.material[lane];
+        let material = &self.scene.materials[index as usize];
+        if path.depth >= self.job.k_max {
+            let most = path.weight.max_element() * material.passed_on();
+            self.gathered.leave_out(path.slot, most, self.radiance.beyond());
+            return;
+        }
+        let point = SurfacePoint::of_lane(block, lane);
+        let d = -point.to_eye.as_dvec3().normalize();
+        let sent = shade::onward(self.scene, self.contacts, &mut self.media, &point, path.medium, d);
+        if let Some(branch) = sent.reflected.and_then(|b| self.worth_sending(&path, &b)) {
+            self.tally.rays.reflected += 1;
+            self.send(branch, &path, &point, 0, path.medium);
+        }
+        if let Some(branch) = sent.refracted.and_then(|b| self.worth_sending(&path, &b)) {
+            self.tally.rays.refracted += 1;
+            self.send(branch, &path, &point, 1, sent.behind);
+        }
     }
 
     /// The branch with its weight in the sample, or `None`, accounted for, if it is cut.
@@ -262,17 +403,46 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             return Some(Branch { weight, ..*branch });
         }
         self.tally.below_cut += 1;
-        let brings = self.radiance.within(self.job.k_max - path.depth - 1);
-        self.gathered.cut[path.slot as usize] += f64::from(most) * f64::from(brings);
+        self.gathered.leave_out(path.slot, most, self.radiance.within(self.job.k_max - path.depth - 1));
         None
     }
 
-    fn send(&mut self, branch: Branch, path: &Path, point: &SurfacePoint) {
+    fn send(&mut self, branch: Branch, path: &Path, point: &SurfacePoint, kind: u32, medium: Medium) {
         if let Some(cost) = &mut self.gathered.cost {
             cost[path.slot as usize] += 1;
         }
         let ray = Ray::new(point.origin_towards(branch.d), branch.d.as_vec3());
-        let path = Path { slot: path.slot, depth: path.depth + 1, weight: branch.weight };
+        let path = Path {
+            slot: path.slot,
+            depth: path.depth + 1,
+            weight: branch.weight,
+            branch: path.branch.bounced(kind),
+            medium,
+        };
         self.waiting.push(Waiting { path, ray });
+    }
+}
+
+impl Gathered {
+    /// Notes that a branch of weight `most` was left out that could have brought `bound`.
+    fn leave_out(&mut self, slot: u32, most: f32, bound: Bound) {
+        let cut = &mut self.cut[slot as usize];
+        cut[0] += f64::from(most) * f64::from(bound.fixed);
+        cut[1] += f64::from(most) * f64::from(bound.scaled);
+    }
+}
+
+/// Length of ray `lane` up to its hit.
+fn distance(packet: &RayHitPacket, lane: usize) -> f64 {
+    let ray = packet.ray.get(lane);
+    ray.d.as_dvec3().length() * f64::from(ray.t_far)
+}
+
+/// Makes hits outside of the range misses.
+fn clip(packet: &mut RayHitPacket, live: usize, (near, far): (f64, f64)) {
+    for lane in 0..live {
+        if packet.hit.geom_id[lane] != INVALID_ID && !(near..=far).contains(&distance(packet, lane)) {
+            packet.hit.geom_id[lane] = INVALID_ID;
+        }
     }
 }

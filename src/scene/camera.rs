@@ -61,6 +61,8 @@ pub struct Camera {
     pub down: DVec3,
     /// The lens; `None` for a pinhole.
     pub lens: Option<Lens>,
+    /// A hit nearer or farther than this along the ray is not seen.
+    pub clip: Option<(f64, f64)>,
 }
 
 /// A thin lens.
@@ -117,9 +119,19 @@ impl CameraDesc {
         };
         let start = if parallel { eye } else { forward };
         let lens = self.lens(unit, right, up, forward)?;
-        let (right, down) = (right * pixel, -up * pixel);
+        let (right, down) = (right * pixel * self.stretch(w / h)?, -up * pixel);
         let corner = start - right * (0.5 * w) - down * (0.5 * h);
-        Ok(Camera { eye, forward, parallel, corner, right, down, lens })
+        let clip = self.clip.map(|(near, far)| (near * unit, far * unit));
+        Ok(Camera { eye, forward, parallel, corner, right, down, lens, clip })
+    }
+
+    /// How much wider than high a pixel is, for an image whose width is `image` times its height.
+    fn stretch(&self, image: f64) -> Result<f64, String> {
+        match self.aspect {
+            None => Ok(1.0),
+            Some(view) if view > 0.0 && view.is_finite() => Ok(view / image),
+            Some(view) => Err(format!("an aspect of {view} is no width over height")),
+        }
     }
 
     fn lens(&self, unit: f64, right: DVec3, up: DVec3, forward: DVec3) -> Result<Option<Lens>, String> {
@@ -264,6 +276,16 @@ mod tests {
                 assert_eq!((ray.o, ray.d), (o.as_vec3(), d.as_vec3()));
             }
         }
+    }
+
+    #[test]
+    fn an_aspect_of_its_own_stretches_the_view() {
+        let camera = CameraDesc { aspect: Some(3.0), ..desc() }.prepare(&frame(), (64, 48)).expect("a good camera");
+        let (_, left) = camera.ray(0.0, 24.0, DVec2::ZERO);
+        let (_, top) = camera.ray(32.0, 0.0, DVec2::ZERO);
+        let off = |d: DVec3| (d - camera.forward).length();
+        assert!((off(left) - 3.0 * off(top)).abs() < 1e-12);
+        assert!(CameraDesc { aspect: Some(0.0), ..desc() }.prepare(&frame(), (64, 48)).is_err());
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Meshes to try things on: a ball of lava rock with as many triangles as asked for, and a first scene.
+//! Things to start from: a ball of lava rock with as many triangles as asked for, and first scenes.
 //!
 //! Everything here is a pure function of its arguments, down to the byte: only operations that IEEE 754
 //! defines exactly are used (no `sin`, no `exp`), so no libm and no machine can change the text.
@@ -18,6 +18,9 @@ use rock::Rock;
 
 /// Lines that one task formats at a time: about half a megabyte of text.
 const CHUNK: u64 = 8192;
+
+/// A scene file with comments that has one of each: ball, box, cylinder, floor, lens, light. TOML.
+pub const FIRST_SCENE: &str = include_str!("example/first.toml");
 
 /// What a generated mesh holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,7 @@
 //! What there is to hit: meshes, placed copies of meshes, and sets of analytic shapes.
 
 use super::obj::CornerData;
+use crate::geom::normal_matrix;
 use crate::geom::{Affine, Bounds, Cube, Cylinder, Plain, Quad, ShapeSet, Sphere, TriangleMesh};
 use glam::{DAffine3, DMat3, Vec2, Vec3};
 use std::sync::Arc;
@@ -34,7 +35,8 @@ pub struct MeshData {
     pub triangles: Arc<TriangleMesh>,
     /// Normals at the corners; absent where the mesh is flat.
     pub normals: Option<CornerData>,
-    /// Texture coordinates at the corners; absent where nothing samples them.
+    /// Texture coordinates at the corners, v downwards as [`Texture::sample`](super::Texture::sample)
+    /// takes it; absent where nothing samples them.
     pub uvs: Option<CornerData>,
     /// Material of each triangle, counted within the mesh's file; absent where one serves all.
     pub face_materials: Option<Vec<u32>>,
@@ -58,6 +60,9 @@ pub struct Instance {
     pub to_scene: DAffine3,
     /// What takes normals to scene space, up to their length.
     pub normal_to_scene: DMat3,
+    /// How much of a coordinate's rounding one axis hands on to the others, there and back: 1
+    /// for scales along the axes, at most 3 for turns, more where the two are mixed.
+    spread: f64,
 }
 
 /// Shapes of one class and their materials.
@@ -177,18 +182,32 @@ impl MeshData {
 }
 
 impl Instance {
+    /// `mesh` placed by `to_scene`, which can be undone.
+    #[must_use]
+    pub fn new(mesh: Mesh, to_scene: DAffine3) -> Self {
+        let m = to_scene.matrix3;
+        let inverse = m.inverse();
+        let size = |m: DMat3| DMat3::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs());
+        let rows = (size(m) * size(inverse)).transpose();
+        let spread =
+            [rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.element_sum()).into_iter().fold(1.0, f64::max);
+        Self { mesh, to_scene, normal_to_scene: normal_matrix(&m), spread }
+    }
+
+    /// What to add to a triangle's size where a ray is kept off it (see
+    /// [`geom::offset_origin`](crate::geom::offset_origin)): a backend that moves the ray into
+    /// the mesh's space in f32 rounds each coordinate once more, by half an ulp of a sum of terms as
+    /// large as the point and the translation.
+    #[must_use]
+    pub fn rounding(&self, corner: Vec3) -> f32 {
+        let reach = f64::from(corner.abs().max_element()) + self.to_scene.translation.abs().max_element();
+        (2.0 * self.spread * reach) as f32
+    }
+
     /// Box around the placed box of the mesh.
     #[must_use]
     pub fn bounds(&self) -> Bounds {
-        let own = self.mesh.data.triangles.bounds();
-        if own.is_empty() {
-            return own;
-        }
-        let m = self.to_scene.matrix3;
-        let half = 0.5 * own.size();
-        let half = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z;
-        let center = self.to_scene.transform_point3(own.center());
-        Bounds { lo: center - half, hi: center + half }
+        self.mesh.data.triangles.bounds().under(&self.to_scene)
     }
 }
 

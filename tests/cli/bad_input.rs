@@ -152,3 +152,46 @@ fn warnings_do_not_stop_a_render_and_can_be_silenced() {
     assert!(said("odd.obj --size 20x20 -o odd.png"));
     assert!(!said("odd.obj --size 20x20 -o odd.png -q"));
 }
+
+#[test]
+fn under_strict_a_warning_is_an_error_and_nothing_is_rendered() {
+    let bench = bench();
+    bench.write("odd.obj", format!("mtllib gone.mtl\nusemtl red\n{TETRAHEDRON}"));
+    let names = bench.names();
+    for words in ["odd.obj --strict -o odd.png", "odd.obj --strict -q -o odd.png", "check odd.obj --strict"] {
+        let out = bench.expect(words, 3);
+        let said = text(&out.stderr);
+        assert!(said.lines().all(|l| l.starts_with("error: ")) && said.contains("gone.mtl"), "{words}: {said}");
+        assert!(said.contains("--strict") && out.stdout.is_empty(), "{words}: {said}");
+    }
+    assert_eq!(bench.names(), names);
+    bench.expect("a.obj --strict --size 20x20 -o fine.png", 0);
+    bench.expect("check a.obj --strict", 0);
+}
+
+#[test]
+fn only_some_of_many_warnings_unless_asked_for() {
+    let bench = bench();
+    let libraries: String = (0..8).map(|i| format!("mtllib gone{i}.mtl\n")).collect();
+    bench.write("odd.obj", format!("{libraries}usemtl red\n{TETRAHEDRON}"));
+    let warnings = |words: &str| {
+        let out = bench.expect(words, 0);
+        let said = text(&out.stderr).to_owned();
+        (said.lines().filter(|l| l.starts_with("warning: ")).count(), said.contains("more (-v shows all)"))
+    };
+    assert_eq!(warnings("odd.obj --size 20x20 -o odd.png"), (6, true));
+    assert_eq!(warnings("odd.obj --size 20x20 -o odd.png -v"), (9, false), "each library and the material");
+    assert_eq!(warnings("check odd.obj"), (9, false));
+}
+
+#[test]
+fn a_biased_lens_is_warned_of_where_there_is_a_lens() {
+    let bench = bench();
+    let said = |flags: &str| {
+        let words = format!("a.obj --size 20x20 -o b.png --lens-sampler polar-uniform-radius {flags}");
+        text(&bench.run(&words).stderr).matches("biased").count()
+    };
+    assert_eq!((said("--aperture 0.1"), said(""), said("--aperture 0.1 -q")), (1, 0, 0));
+    bench.expect("a.obj --aperture 0.1 --lens-sampler polar-uniform-radius --strict -o c.png", 3);
+    assert!(!bench.path("c.png").exists());
+}

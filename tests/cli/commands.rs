@@ -49,11 +49,22 @@ fn mistakes_name_the_nearest_right_word() {
 #[test]
 fn nothing_is_accepted_and_ignored() {
     let bench = Bench::new();
-    for words in
-        ["a.obj --exposure 2", "a.obj --tonemap aces", "info a.obj --size 3x3", "check a.obj --json", "man --json"]
-    {
+    for words in [
+        "a.obj -o a.exr --exposure 2",
+        "a.obj -o a.exr --tonemap aces",
+        "a.obj --tonemap stretch --exposure 2",
+        "a.obj -D render.samples=4",
+        "check a.obj -D render.samples=4",
+        "info a.obj -D render.samples=4",
+        "a.obj --focus 2",
+        "info a.obj --size 3x3",
+        "info a.obj --strict",
+        "check a.obj --json",
+        "man --json",
+    ] {
         bench.expect(words, 2);
     }
+    assert_eq!(bench.names(), ["a.obj"]);
 }
 
 #[test]
@@ -102,10 +113,10 @@ fn stats_have_the_keys_that_others_read() {
     let wanted = [
         ("", "tison backend embree threads image scene seconds rays mrays_per_s peak_rss_bytes skipped error"),
         ("image", "width height spp_mean"),
-        ("scene", "triangles degenerate spheres cubes cylinders lights materials"),
+        ("scene", "triangles degenerate spheres cubes cylinders quads instances lights materials textures"),
         ("seconds", "read textures build render write total"),
         ("rays", "camera shadow reflected refracted"),
-        ("error", "cut_off_max cut_off_mean sampling_rmse_estimate non_finite_samples"),
+        ("error", "cut_off_max cut_off_mean sampling_rmse_estimate cut_off_is_estimate non_finite_samples"),
     ];
     for (part, keys) in wanted {
         let object = if part.is_empty() { &stats } else { &stats[part] };
@@ -121,7 +132,10 @@ fn stats_have_the_keys_that_others_read() {
     assert_eq!(stats["threads"], 2);
     assert_eq!(stats["rays"]["camera"], 1200);
     assert!(stats["rays"]["shadow"].as_u64().unwrap() > 0);
-    assert!(stats["skipped"].is_object() && stats["skipped"]["refraction"].is_string());
+    for name in ["refraction", "textures", "area_lights", "absorption", "lens", "pixel_jitter", "user_geometry"] {
+        assert!(stats["skipped"][name].is_string(), "{name}");
+    }
+    assert!(stats["skipped"].get("meshes").is_none() && stats["skipped"].get("specular").is_none());
     assert!(stats["peak_rss_bytes"].as_u64().unwrap() > 1_000_000);
     let seconds = &stats["seconds"];
     let sum: f64 = ["read", "build", "render", "write"].iter().map(|s| seconds[s].as_f64().unwrap()).sum();
@@ -188,6 +202,44 @@ fn examples_are_listed_and_written() {
     bench.expect("example mesh --triangles 20 -o no/b.obj", 4);
     bench.expect("example nonsense", 2);
     assert_eq!(bench.names(), ["a.obj", "ball.obj"]);
+}
+
+#[test]
+fn the_example_scene_goes_to_a_file_or_to_stdout_and_over_nobodys_work() {
+    let bench = Bench::new();
+    assert!(text(&bench.expect("example", 0).stdout).contains("example scene -o scene.toml"));
+    bench.expect("example scene -o scene.toml", 0);
+    assert!(bench.read("scene.toml") == bench.expect("example scene", 0).stdout);
+    bench.expect("example scene -o scene.toml", 0);
+    bench.write("scene.toml", "mine");
+    assert!(text(&bench.expect("example scene -o scene.toml", 4).stderr).contains("already"));
+    assert_eq!(bench.read("scene.toml"), b"mine");
+    bench.expect("example scene -o no/scene.toml", 4);
+}
+
+#[test]
+fn settings_of_a_mesh_and_where_they_come_from() {
+    let bench = Bench::new();
+    let words = "a.obj --print-config --spp 4 --fov 30 --aov depth -j 2 -o x.exr";
+    let out = bench.expect(words, 0);
+    let told = text(&out.stdout);
+    let rows: Vec<Vec<&str>> = told.lines().map(|l| l.split_whitespace().collect()).collect();
+    for want in [
+        ["size", "1280x720", "default"],
+        ["spp", "4", "flag"],
+        ["recursion", "8", "default"],
+        ["camera", "three-quarter", "default"],
+        ["fov", "30", "flag"],
+        ["up", "0,1,0", "default"],
+        ["tonemap", "none", "default"],
+        ["threads", "2", "flag"],
+        ["output", "x.exr", "flag"],
+        ["aov", "depth", "flag"],
+    ] {
+        assert!(rows.iter().any(|r| r[..] == want), "{want:?} in\n{told}");
+    }
+    assert!(out.stderr.is_empty());
+    assert_eq!(bench.names(), ["a.obj"], "nothing is rendered");
 }
 
 #[test]

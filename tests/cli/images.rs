@@ -134,3 +134,37 @@ fn views_and_cameras_differ() {
     }
     assert!(image("--camera three-quarter") == images[0]);
 }
+
+#[test]
+fn curves_change_8_bit_images_and_no_others() {
+    let bench = Bench::new();
+    let image = |flags: &str| {
+        bench.expect(&format!("a.obj --size 40x30 -o a.png -o a.pfm {flags}"), 0);
+        (decode_file(&bench.path("a.png")).2, bench.read("a.pfm"))
+    };
+    let plain = image("");
+    assert!(image("--tonemap none --exposure 0") == plain);
+    let mut seen = vec![plain.0];
+    for flags in ["--tonemap reinhard", "--tonemap aces", "--tonemap stretch", "--exposure 1", "--exposure -1.5"] {
+        let (png, pfm) = image(flags);
+        assert!(!seen.contains(&png) && pfm == plain.1, "{flags}");
+        seen.push(png);
+    }
+    assert!(seen[3].contains(&0) && seen[3].contains(&255), "stretched to both ends");
+}
+
+#[test]
+fn a_stretched_image_runs_over_the_range_of_its_light() {
+    let bench = Bench::new();
+    bench.expect("a.obj --size 40x30 -o a.png -o a.pfm --tonemap stretch", 0);
+    let (_, _, bytes) = decode_file(&bench.path("a.png"));
+    let pfm = bench.read("a.pfm");
+    let body = pfm.strip_prefix(b"PF\n40 30\n-1.0\n").unwrap();
+    let light: Vec<f64> = body.chunks(4).map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap()))).collect();
+    let (min, max) = light.iter().fold((f64::MAX, f64::MIN), |(lo, hi), &v| (lo.min(v), hi.max(v)));
+    // Rows of a PFM go from the bottom up.
+    let rows = light.chunks(120).rev().flatten();
+    for (byte, v) in bytes.iter().zip(rows) {
+        assert_eq!(*byte, (255.0 * ((v - min) / (max - min))) as u8, "{v}");
+    }
+}

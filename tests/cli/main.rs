@@ -3,6 +3,7 @@
 mod bad_input;
 mod commands;
 mod images;
+mod scenes;
 mod signals;
 
 use assert_cmd::Command;

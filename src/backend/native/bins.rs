@@ -1,5 +1,6 @@
-//! What the builder counts with: boxes of triangles, and bins along the three axes.
+//! What the builder counts with: boxes with numbers, and bins along the three axes.
 
+use crate::geom::Bounds;
 use glam::{BVec4A, Vec3, Vec4};
 
 /// Most bins per axis.
@@ -7,18 +8,41 @@ pub(super) const BINS: usize = 16;
 
 const XYZ: BVec4A = BVec4A::new(true, true, true, false);
 
-/// Box and number of one triangle, while the tree is built.
+/// `hi.w` of an item that shares leaves, and of a box around nothing but such.
+const SHARES: f32 = 0.0;
+
+/// `hi.w` of an item that has a leaf to itself. It goes up into all boxes around the item.
+const APART: f32 = 1.0;
+
+/// No box reaches farther, so that sums and differences of its sides are finite.
+const FARTHEST: f64 = 1e37;
+
+/// Box and number of one thing, while the tree is built.
 #[derive(Clone, Copy)]
 pub(super) struct Item {
     /// x, y, z and the bits of the number.
     lo_id: Vec4,
+    /// x, y, z and [`SHARES`] or [`APART`].
     pub(super) hi: Vec4,
 }
 
 impl Item {
-    pub(super) fn new(corners: [Vec3; 3], id: u32) -> Self {
+    pub(super) fn triangle(corners: [Vec3; 3], id: u32) -> Self {
         let [a, b, c] = corners;
-        Self { lo_id: a.min(b).min(c).extend(f32::from_bits(id)), hi: a.max(b).max(c).extend(0.0) }
+        Self { lo_id: a.min(b).min(c).extend(f32::from_bits(id)), hi: a.max(b).max(c).extend(SHARES) }
+    }
+
+    /// Something with a leaf to itself. Beyond 1e37 nothing is sure to be hit.
+    pub(super) fn apart(bounds: &Bounds, id: u32) -> Self {
+        let side = |x: f64, far: f64| if x.is_nan() { far } else { x.clamp(-FARTHEST, FARTHEST) };
+        let lo = bounds.lo.map(|x| side(x, -FARTHEST)).as_vec3();
+        let hi = bounds.hi.map(|x| side(x, FARTHEST)).as_vec3();
+        Self { lo_id: lo.map(f32::next_down).extend(f32::from_bits(id)), hi: hi.map(f32::next_up).extend(APART) }
+    }
+
+    /// Whether it has a leaf to itself.
+    pub(super) fn is_apart(&self) -> bool {
+        self.hi.w == APART
     }
 
     #[inline]
@@ -38,7 +62,7 @@ impl Item {
     }
 }
 
-/// A box in f32; w is not used.
+/// A box in f32. `hi.w` is that of the items in it.
 #[derive(Clone, Copy)]
 pub(super) struct Box4 {
     pub(super) lo: Vec4,
@@ -72,6 +96,11 @@ impl Box4 {
         e.x * e.y + e.y * e.z + e.z * e.x
     }
 
+    /// Whether nothing in it has a leaf to itself.
+    pub(super) fn shares(&self) -> bool {
+        self.hi.w <= SHARES
+    }
+
     pub(super) fn longest_axis(&self) -> usize {
         let e = self.size();
         if e.x >= e.y && e.x >= e.z {
@@ -89,15 +118,19 @@ impl Box4 {
         1.0 / e.x.max(e.y).max(e.z).max(f32::MIN_POSITIVE)
     }
 
-    /// The box a ray is tested against: wider by 2^-24 of its largest edge and one ulp.
+    /// The box a ray is tested against: wider by 2^-24 of its largest edge and two ulps.
     ///
     /// A ray that the f64 test lets hit may pass a triangle by 2^-50 of its size, and one
-    /// that runs in a side of the box must be inside, so that `0 * inf` cannot decide.
+    /// that runs in a side of the box must be inside, so that `0 * inf` cannot decide. The
+    /// second ulp is for origins that were rounded.
     pub(super) fn padded(&self) -> Self {
         let e = self.size();
         let pad = Vec4::splat(e.x.max(e.y).max(e.z) * (0.5 * f32::EPSILON));
         let out = |v: Vec4, f: fn(f32) -> f32| Vec4::new(f(v.x), f(v.y), f(v.z), 0.0);
-        Self { lo: out(self.lo - pad, f32::next_down), hi: out(self.hi + pad, f32::next_up) }
+        Self {
+            lo: out(self.lo - pad, |x| x.next_down().next_down()),
+            hi: out(self.hi + pad, |x| x.next_up().next_up()),
+        }
     }
 }
 
@@ -192,7 +225,7 @@ impl Bins {
     }
 
     /// The plane of least cost with items on both sides: area times tests, summed over
-    /// both sides. Four triangles are one test.
+    /// both sides. Four things are one test.
     pub(super) fn best(&self, binning: &Binning, unit: f32) -> Option<Plane> {
         let mut best = (f32::INFINITY, None);
         for axis in (0..3).filter(|&axis| binning.usable[axis]) {

@@ -2,24 +2,36 @@
 //!
 //! Source: I. Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies",
 //! RT 2007; four children at once by splitting the largest of them again, as Embree does.
-//! Every decision depends on the triangles alone, so the tree is the same for any number
+//! Every decision depends on the boxes alone, so the tree is the same for any number
 //! of threads.
 
 use super::bins::{BINS, Binning, Bins, Box4, Item, Plane};
-use super::bvh::{Block, Bvh, Child, HEURISTIC_DEPTH, Node, WIDTH};
+use super::bvh::{Apart, Block, Bvh, Child, HEURISTIC_DEPTH, MAX_THINGS, Node, WIDTH};
 use super::{BuildError, BuildOptions, Quality};
-use crate::geom::{BAD_FACE, TriangleMesh};
+use crate::geom::{BAD_FACE, Bounds, ShapeSet, TriangleMesh};
+use crate::scene::AnyShapes;
+use crate::with_shapes;
 use rayon::prelude::*;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Below this many triangles a subtree is built by one thread.
+/// Below this many things a subtree is built by one thread.
 const TASK: usize = 1 << 12;
 
-/// Above this many triangles they are counted into bins by several threads.
+/// Above this many things they are counted into bins by several threads.
 const WIDE: usize = 1 << 16;
 
-/// Triangles that stay together, with the box around them and the one around their
+/// An object as the builder sees it: boxes.
+#[derive(Clone, Copy)]
+pub(super) enum Source<'a> {
+    /// Four faces may share a leaf.
+    Mesh(&'a TriangleMesh),
+    /// Each shape has a leaf to itself.
+    Shapes(&'a AnyShapes),
+    /// One leaf for all of it; an empty box is left out.
+    Whole(Bounds),
+}
+
+/// Things that stay together, with the box around them and the one around their
 /// centroids.
 struct Group<'a> {
     items: &'a mut [Item],
@@ -29,7 +41,7 @@ struct Group<'a> {
     centroids: Box4,
 }
 
-/// Triangles of one leaf among all items.
+/// Things of one leaf among all items.
 #[derive(Clone, Copy)]
 struct LeafRange {
     start: u32,
@@ -58,38 +70,82 @@ struct Builder<'a> {
     cancel: &'a AtomicBool,
 }
 
-/// Builds the hierarchy over all faces that can be hit; `first[g]` is the number of the
-/// first face of mesh `g`.
-pub(super) fn build(
-    meshes: &[Arc<TriangleMesh>],
-    first: &[u32],
-    options: &BuildOptions<'_>,
-) -> Result<Bvh, BuildError> {
+/// Number of the first thing of each source: all are counted through.
+pub(super) fn numbers(sources: &[Source<'_>]) -> Result<Vec<u32>, BuildError> {
+    let mut next = 0;
+    let first = sources.iter().map(|source| {
+        let first = next as u32;
+        next += source.len();
+        first
+    });
+    let first = first.collect();
+    if next > MAX_THINGS { Err(BuildError::TooMany { count: next }) } else { Ok(first) }
+}
+
+/// `(index of the source, number within it)` of the thing with number `id`.
+#[inline]
+pub(super) fn owner(first: &[u32], id: u32) -> (u32, u32) {
+    let source = first.partition_point(|&f| f <= id) - 1;
+    (source as u32, id - first[source])
+}
+
+/// Builds the hierarchy over all that can be hit; `first` is their [`numbers`].
+pub(super) fn build(sources: &[Source<'_>], first: &[u32], options: &BuildOptions<'_>) -> Result<Bvh, BuildError> {
     let builder = Builder { quality: options.quality, cancel: options.cancel };
-    let mut items = items(meshes, first);
-    let tree = builder.tree(&mut items).map_err(|Cancelled| BuildError::Cancelled)?;
+    let mut items = items(sources, first);
+    let mut tree = builder.tree(&mut items).map_err(|Cancelled| BuildError::Cancelled)?;
+    let items_of = |leaf: &LeafRange| &items[leaf.start as usize..][..leaf.count as usize];
+    let is_apart = |leaf: &LeafRange| items_of(leaf)[0].is_apart();
     let block = |leaf: &LeafRange| {
-        let (start, count) = (leaf.start as usize, leaf.count as usize);
         let mut block = Block::EMPTY;
-        for (lane, item) in items[start..start + count].iter().enumerate() {
-            let (geom, prim) = super::owner(first, item.id());
-            block.set(lane, meshes[geom as usize].triangle(prim), item.id());
+        for (lane, item) in items_of(leaf).iter().enumerate() {
+            let (source, prim) = owner(first, item.id());
+            if let Source::Mesh(mesh) = sources[source as usize] {
+                block.set(lane, mesh.triangle(prim), item.id());
+            }
         }
         block
     };
-    let blocks = tree.leaves.par_iter().with_min_len(TASK).map(block).collect();
-    Ok(Bvh { nodes: tree.nodes, blocks, depth: tree.depth })
+    let apart = |leaf: &LeafRange| {
+        let (object, prim) = owner(first, items_of(leaf)[0].id());
+        Apart { object, prim }
+    };
+    let only_meshes = sources.iter().all(|s| matches!(s, Source::Mesh(_)));
+    let at = if only_meshes { tree.leaves.len() } else { tree.blocks_first(is_apart) };
+    let (blocks, others) = tree.leaves.split_at(at);
+    let blocks = blocks.par_iter().with_min_len(TASK).map(block).collect();
+    let apart = others.par_iter().with_min_len(TASK).map(apart).collect();
+    Ok(Bvh { nodes: tree.nodes, blocks, apart, depth: tree.depth })
 }
 
-/// Boxes of all faces that can be hit, in the order of their numbers.
-fn items(meshes: &[Arc<TriangleMesh>], first: &[u32]) -> Vec<Item> {
-    let good = meshes.iter().map(|m| m.face_count() - m.faults().total()).sum();
-    let mut items = Vec::with_capacity(good);
-    for (mesh, &first) in meshes.iter().zip(first) {
-        items.par_extend(mesh.faces().par_iter().enumerate().with_min_len(TASK).filter_map(|(i, &face)| {
-            let prim = i as u32;
-            (face != BAD_FACE).then(|| Item::new(mesh.triangle(prim), first + prim))
-        }));
+impl Source<'_> {
+    fn len(&self) -> usize {
+        match self {
+            Self::Mesh(mesh) => mesh.face_count(),
+            Self::Shapes(set) => set.len() as usize,
+            Self::Whole(_) => 1,
+        }
+    }
+}
+
+/// Boxes of all that can be hit, in the order of their numbers.
+fn items(sources: &[Source<'_>], first: &[u32]) -> Vec<Item> {
+    let mut items = Vec::with_capacity(sources.iter().map(Source::len).sum());
+    for (source, &first) in sources.iter().zip(first) {
+        match source {
+            Source::Mesh(mesh) => {
+                items.par_extend(mesh.faces().par_iter().enumerate().with_min_len(TASK).filter_map(|(i, &face)| {
+                    let prim = i as u32;
+                    (face != BAD_FACE).then(|| Item::triangle(mesh.triangle(prim), first + prim))
+                }));
+            }
+            Source::Shapes(set) => {
+                let item = |prim| Item::apart(&with_shapes!(set, set => set.bounds(prim)), first + prim);
+                items.par_extend((0..set.len()).into_par_iter().with_min_len(TASK).map(item));
+            }
+            Source::Whole(bounds) if bounds.is_empty() => {}
+            Source::Whole(bounds) => items.push(Item::apart(bounds, first)),
+        }
     }
     items
 }
@@ -198,6 +254,28 @@ fn cheapest_plane(group: &Group<'_>) -> Option<Plane> {
 }
 
 impl Subtree {
+    /// Gives the leaves for which `is_apart` the highest numbers; the first of those.
+    fn blocks_first(&mut self, is_apart: impl Fn(&LeafRange) -> bool + Sync + Send) -> usize {
+        let is_apart: Vec<bool> = self.leaves.par_iter().with_min_len(TASK).map(is_apart).collect();
+        let blocks = is_apart.iter().filter(|&&apart| !apart).count();
+        let mut next = [0, blocks];
+        let take = |&apart: &bool| {
+            next[usize::from(apart)] += 1;
+            next[usize::from(apart)] - 1
+        };
+        let places: Vec<usize> = is_apart.iter().map(take).collect();
+        let from = self.leaves.clone();
+        for (leaf, &place) in from.iter().zip(&places) {
+            self.leaves[place] = *leaf;
+        }
+        self.nodes.par_iter_mut().with_min_len(TASK).for_each(|node| {
+            for child in node.child.iter_mut().filter(|c| c.is_leaf() && **c != Child::NONE) {
+                *child = Child::leaf(places[child.leaf_index()], child.lanes().count_ones() as usize);
+            }
+        });
+        blocks
+    }
+
     /// Appends a leaf and says how a node refers to it.
     fn leaf(&mut self, leaf: LeafRange) -> Child {
         self.leaves.push(leaf);
@@ -210,8 +288,8 @@ impl Subtree {
         match part {
             Part::Leaf(leaf) => return self.leaf(leaf),
             Part::Done(tree) => {
-                let blocks = self.leaves.len();
-                let moved = |n: Node| Node { child: n.child.map(|c| c.moved(base, blocks)), ..n };
+                let leaves = self.leaves.len();
+                let moved = |n: Node| Node { child: n.child.map(|c| c.moved(base, leaves)), ..n };
                 self.nodes.extend(tree.nodes.into_iter().map(moved));
                 self.leaves.extend(tree.leaves);
                 self.depth = self.depth.max(tree.depth);
@@ -246,7 +324,7 @@ impl<'a> Group<'a> {
     }
 
     fn is_leaf(&self) -> bool {
-        self.items.len() <= WIDTH
+        self.items.len() <= if self.bounds.shares() { WIDTH } else { 1 }
     }
 
     fn leaf(&self) -> LeafRange {
@@ -308,19 +386,19 @@ mod tests {
 
     static NEVER: AtomicBool = AtomicBool::new(false);
 
-    fn built(mesh: &Arc<TriangleMesh>, quality: Quality) -> Bvh {
+    fn built(mesh: &TriangleMesh, quality: Quality) -> Bvh {
         let options = BuildOptions { quality, cancel: &NEVER };
-        build(&[Arc::clone(mesh)], &[0], &options).expect("never cancelled")
+        build(&[Source::Mesh(mesh)], &[0], &options).expect("never cancelled")
     }
 
-    fn soup(triangles: impl Iterator<Item = [Vec3; 3]>) -> Arc<TriangleMesh> {
+    fn soup(triangles: impl Iterator<Item = [Vec3; 3]>) -> TriangleMesh {
         let points: Vec<f32> = triangles.flatten().flat_map(|p| p.to_array()).collect();
         let faces = (0..points.len() as u32 / 9).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        Arc::new(TriangleMesh::new(points, faces))
+        TriangleMesh::new(points, faces)
     }
 
     /// Small triangles along a spiral.
-    fn spiral(n: u32) -> Arc<TriangleMesh> {
+    fn spiral(n: u32) -> TriangleMesh {
         soup((0..n).map(|i| {
             let a = i as f32 * 0.37;
             let p = Vec3::new(a.cos(), a.sin(), 1e-4 * i as f32) * (1.0 + (1.7 * a).sin());
@@ -330,7 +408,7 @@ mod tests {
 
     /// Each triangle is 1.5 times the size of the one before: planes at equal distances
     /// peel off a few at a time.
-    fn growing(n: i32) -> Arc<TriangleMesh> {
+    fn growing(n: i32) -> TriangleMesh {
         soup((0..n).map(|i| {
             let s = 1.5f32.powi(i % 200 - 100) * (1.0 + 0.001 * (i / 200) as f32);
             [Vec3::splat(s), Vec3::new(2.0 * s, s, s), Vec3::new(s, 2.0 * s, s)]
@@ -340,7 +418,7 @@ mod tests {
     /// Counts each triangle, and checks that the boxes above hold it with room to spare.
     fn visit(bvh: &Bvh, child: Child, (lo, hi): (Vec3, Vec3), depth: usize, seen: &mut [u32]) -> usize {
         if child.is_leaf() {
-            let block = &bvh.blocks[child.block_index()];
+            let block = &bvh.blocks[child.leaf_index()];
             for lane in (0..WIDTH).filter(|lane| child.lanes() >> lane & 1 == 1) {
                 seen[block.id[lane] as usize] += 1;
                 for p in block.triangle(lane) {

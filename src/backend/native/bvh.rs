@@ -1,4 +1,4 @@
-//! The hierarchy in memory: nodes of four boxes, leaves of up to four triangles.
+//! The hierarchy in memory: nodes of four boxes, leaves of up to four triangles or one other thing.
 
 use super::bins::Box4;
 use glam::{Vec3, Vec4};
@@ -6,20 +6,20 @@ use glam::{Vec3, Vec4};
 /// Children of a node, and triangles of a leaf: the lanes of one SSE register.
 pub(super) const WIDTH: usize = 4;
 
-/// Most triangles of one hierarchy: in the worst case each has a leaf of its own, and a
+/// Most things in one hierarchy: in the worst case each has a leaf of its own, and a
 /// [`Child`] has 29 bits for the leaf (the last value is kept for [`Child::NONE`]).
-pub(super) const MAX_TRIANGLES: usize = (1 << 29) - 1;
+pub(super) const MAX_THINGS: usize = (1 << 29) - 1;
 
 /// Most nodes on the way from the root to a leaf. The builder stops to follow the
 /// surface-area heuristic at [`HEURISTIC_DEPTH`] and halves what is left from there on:
-/// 2^29 triangles are at most 28 halvings away from leaves.
+/// where 2^29 things meet, the last node with two of them is 28 halvings away.
 pub(super) const MAX_DEPTH: usize = HEURISTIC_DEPTH + 28;
 
 /// See [`MAX_DEPTH`].
 pub(super) const HEURISTIC_DEPTH: usize = 56;
 
-/// What a child of a node is, in 32 bits: an inner node, a leaf with its number of
-/// triangles, or nothing.
+/// What a child of a node is, in 32 bits: an inner node, a leaf with the number of things
+/// in it, or nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Child(u32);
 
@@ -35,9 +35,9 @@ impl Child {
         Self(index as u32)
     }
 
-    pub(super) fn leaf(block: usize, count: usize) -> Self {
-        debug_assert!(block < MAX_TRIANGLES && (1..=WIDTH).contains(&count));
-        Self(Self::LEAF | (block as u32) << 2 | (count as u32 - 1))
+    pub(super) fn leaf(leaf: usize, count: usize) -> Self {
+        debug_assert!(leaf < MAX_THINGS && (1..=WIDTH).contains(&count));
+        Self(Self::LEAF | (leaf as u32) << 2 | (count as u32 - 1))
     }
 
     #[inline]
@@ -51,9 +51,9 @@ impl Child {
         self.0 as usize
     }
 
-    /// Index of the block, where it is a leaf.
+    /// Number of the leaf, where it is one.
     #[inline]
-    pub(super) fn block_index(self) -> usize {
+    pub(super) fn leaf_index(self) -> usize {
         ((self.0 & !Self::LEAF) >> 2) as usize
     }
 
@@ -63,12 +63,12 @@ impl Child {
         0b1111 >> (3 - (self.0 & 3))
     }
 
-    /// The same child where nodes and blocks have moved up by these numbers.
-    pub(super) fn moved(self, nodes: usize, blocks: usize) -> Self {
+    /// The same child where nodes and leaves have moved up by these numbers.
+    pub(super) fn moved(self, nodes: usize, leaves: usize) -> Self {
         if self == Self::NONE {
             self
         } else if self.is_leaf() {
-            Self(self.0 + ((blocks as u32) << 2))
+            Self(self.0 + ((leaves as u32) << 2))
         } else {
             Self(self.0 + nodes as u32)
         }
@@ -106,7 +106,7 @@ impl Node {
 pub(super) struct Block {
     /// `corners[k][axis]`: coordinate `axis` of corner `k` of the four triangles.
     pub(super) corners: [[Vec4; 3]; 3],
-    /// Number of each triangle, counted through all meshes.
+    /// Number of each triangle.
     pub(super) id: [u32; WIDTH],
 }
 
@@ -137,11 +137,40 @@ impl Block {
     }
 }
 
-/// A whole hierarchy; node 0 is the root. No nodes: no triangles.
+/// Something that has a leaf to itself: a shape, or a placed mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Apart {
+    /// Index of the object.
+    pub(super) object: u32,
+    /// Number within the object.
+    pub(super) prim: u32,
+}
+
+/// A whole hierarchy; node 0 is the root. No nodes: nothing is in it.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Bvh {
     pub(super) nodes: Vec<Node>,
+    /// The first leaves.
     pub(super) blocks: Vec<Block>,
+    /// The leaves after those.
+    pub(super) apart: Vec<Apart>,
     /// Nodes on the longest way from the root to a leaf.
     pub(super) depth: usize,
+}
+
+impl Bvh {
+    /// Most children that wait at once on the way of a ray: all but one of each node.
+    pub(super) fn stack_len(&self) -> usize {
+        (WIDTH - 1) * self.depth
+    }
+
+    /// Which of `apart` is in a leaf, if it is one of those.
+    #[inline]
+    pub(super) fn apart_index(&self, leaf: Child) -> Option<usize> {
+        leaf.leaf_index().checked_sub(self.blocks.len())
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..]) + size_of_val(&self.apart[..])
+    }
 }

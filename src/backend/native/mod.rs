@@ -1,35 +1,48 @@
-//! The pure-Rust tracer: a hierarchy of its own, and a triangle test that decides in f64.
+//! The pure-Rust tracer: hierarchies of its own, a triangle test that decides in f64, and the
+//! shared formulas of the shapes.
 //!
 //! | part | job |
 //! |---|---|
-//! | `build`, `bins` | the hierarchy from the triangles, in parallel |
-//! | `bvh` | the hierarchy in memory |
+//! | `build`, `bins` | a hierarchy from boxes, in parallel |
+//! | `bvh` | a hierarchy in memory |
 //! | `ray` | a ray prepared for boxes and triangles |
-//! | `traverse` | the way of a ray through the hierarchy |
-//! | `packet` | the same for sixteen coherent rays |
+//! | `traverse` | the way of a ray through a hierarchy |
+//! | `world` | the hierarchy of the scene; its shapes and placed meshes |
+//! | `placed` | a mesh in a space of its own |
+//! | `packet`, `beam`, `wide` | the same for sixteen coherent rays |
 //!
-//! What a ray meets is decided by [`triangle::intersect`](crate::geom::triangle::intersect)
-//! alone. Boxes and the f32 filter before it only skip triangles that it would turn away,
-//! with their own rounding accounted for, so that the answer is that of a loop over all
-//! triangles: the least `t`, and among equal ones the lowest `(geom_id, prim_id)`. Only a
-//! triangle that holds the ray in its plane to within f64's rounding may be passed over:
-//! whether it is hit, and where, is rounding as well.
+//! What a ray meets is decided by [`triangle::intersect`](crate::geom::triangle::intersect) and
+//! [`ShapeSet::hit`](crate::geom::ShapeSet::hit) alone, in f64, for a placed mesh with the ray in
+//! the mesh's own space. Boxes and the f32 filter before triangles only skip what would be turned
+//! away, with their own rounding accounted for, so that the answer is that of a loop over
+//! everything: the least `t`, and among equal ones the lowest `(geom_id, prim_id)`. Passed over may
+//! be only what f64 cannot decide: a triangle that holds the ray in its plane to within rounding
+//! (whether it is hit, and where, is rounding as well), and a shape that the ray passes at less
+//! than a millionth of its size.
+//!
+//! Of a shape only `t` is reported; [`ShapeSet::refine`](crate::geom::ShapeSet::refine) tells the
+//! rest. The normal of a placed triangle is in scene space, as its moved corners are wound: under a
+//! mirror it points to the side that the winding in the mesh's own space calls inner.
 
+mod beam;
 mod bins;
 mod build;
 mod bvh;
 mod packet;
+mod placed;
 mod ray;
 mod traverse;
+mod wide;
+mod world;
 
 use super::Backend;
-use crate::geom::{Coherence, Hit, PacketBatch, Ray, RayHitPacket, RayPacket, TriangleMesh};
-use bvh::{Bvh, MAX_TRIANGLES};
+use crate::geom::{Coherence, Hit, PacketBatch, Ray, RayHitPacket, RayPacket, ShapeError};
+use crate::scene::Object;
+use bvh::MAX_THINGS;
 use core::fmt;
 use packet::Packets;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use traverse::Found;
+use world::World;
 
 /// How much time the hierarchy is worth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -52,107 +65,81 @@ pub struct BuildOptions<'a> {
 }
 
 /// Why there is no hierarchy.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BuildError {
     /// [`BuildOptions::cancel`] was set.
     #[error("building the hierarchy was cancelled")]
     Cancelled,
-    /// More triangles than it can number.
-    #[error("{count} triangles in one scene are more than the native backend can number ({MAX_TRIANGLES})")]
-    TooManyTriangles {
-        /// Faces of all meshes.
+    /// More than it can number.
+    #[error("{count} triangles and shapes in one scene are more than the native backend can number ({MAX_THINGS})")]
+    TooMany {
+        /// Faces of all meshes and shapes of all sets; a placed mesh counts as one.
         count: usize,
+    },
+    /// A mesh is placed where no ray can be taken back from.
+    #[error("object {object} cannot be traced where it is placed")]
+    Transform {
+        /// Its index in the scene.
+        object: usize,
+        /// What is wrong with the transform.
+        source: ShapeError,
     },
 }
 
-/// A frozen scene of triangle meshes, traced without Embree.
+/// A frozen scene, traced without Embree.
 pub struct Native {
-    bvh: Bvh,
-    /// Number of the first face of each mesh: faces are counted through all meshes.
-    first: Vec<u32>,
+    world: World,
 }
 
 impl Native {
-    /// Builds one hierarchy over all `meshes` on the current rayon pool.
+    /// Builds the hierarchies of all `objects` on the current rayon pool: one of the scene, one of
+    /// each mesh that is placed.
     ///
-    /// `geom_id` of a hit is the index in `meshes`, `prim_id` the face's. The corners are
-    /// copied: the meshes are not kept. The tree is the same for any number of threads.
+    /// `geom_id` of a hit is the index in `objects`, `prim_id` the face's or the shape's. Corners
+    /// are copied, sets of shapes are shared. The trees are the same for any number of threads.
     ///
     /// # Errors
-    /// If it was cancelled, or there are 2^29 triangles and more.
-    pub fn build(meshes: &[Arc<TriangleMesh>], options: &BuildOptions<'_>) -> Result<Self, BuildError> {
-        let count = meshes.iter().map(|m| m.face_count()).sum();
-        if count > MAX_TRIANGLES {
-            return Err(BuildError::TooManyTriangles { count });
-        }
-        let first: Vec<u32> = meshes
-            .iter()
-            .scan(0, |next, mesh| {
-                let first = *next;
-                *next += mesh.face_count() as u32;
-                Some(first)
-            })
-            .collect();
-        let bvh = build::build(meshes, &first, options)?;
-        Ok(Self { bvh, first })
+    /// If it was cancelled, a placement cannot be undone, or there are 2^29 triangles and shapes
+    /// and more.
+    pub fn build(objects: &[Object], options: &BuildOptions<'_>) -> Result<Self, BuildError> {
+        Ok(Self { world: World::build(objects, options)? })
     }
 
-    /// Bytes of the hierarchy with its copy of the triangles.
+    /// Bytes of the hierarchies with their copies of the triangles.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.bvh.nodes[..]) + size_of_val(&self.bvh.blocks[..]) + size_of_val(&self.first[..])
+        self.world.bytes()
     }
 }
 
 impl fmt::Debug for Native {
-    /// Counts: the hierarchy itself would fill many screens.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (nodes, leaves) = (self.bvh.nodes.len(), self.bvh.blocks.len());
-        f.debug_struct("Native")
-            .field("meshes", &self.first.len())
-            .field("nodes", &nodes)
-            .field("leaves", &leaves)
-            .field("depth", &self.bvh.depth)
-            .finish()
-    }
-}
-
-/// `(geom_id, prim_id)` of the face with number `id`.
-fn owner(first: &[u32], id: u32) -> (u32, u32) {
-    let geom = first.partition_point(|&f| f <= id) - 1;
-    (geom as u32, id - first[geom])
-}
-
-impl Native {
-    fn hit(&self, found: &Found) -> Hit {
-        let (geom_id, prim_id) = owner(&self.first, found.id);
-        Hit { t: found.t, u: found.u, v: found.v, ng: found.ng, prim_id, geom_id }
+        f.debug_tuple("Native").field(&self.world).finish()
     }
 }
 
 impl Backend for Native {
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.bvh.nearest(ray).map(|found| self.hit(&found))
+        self.world.nearest(ray)
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        self.bvh.any(ray)
+        self.world.any(ray)
     }
 
     fn intersect_many(&self, rays: &mut PacketBatch<RayHitPacket>, coherence: Coherence) {
-        let mut packets = Packets::new(&self.bvh);
+        let mut packets = Packets::new(&self.world);
         for (packet, live) in rays.packets_mut() {
             packets.trace::<false>(&packet.ray, live, coherence);
             for lane in 0..live {
-                let hit = packets.found(lane).map(|found| self.hit(&found));
-                packet.set_hit(lane, hit.as_ref());
+                packet.set_hit(lane, packets.hit(lane).as_ref());
             }
         }
     }
 
     fn occluded_many(&self, rays: &mut PacketBatch<RayPacket>, coherence: Coherence) {
-        let mut packets = Packets::new(&self.bvh);
+        let mut packets = Packets::new(&self.world);
         for (packet, live) in rays.packets_mut() {
             packets.trace::<true>(packet, live, coherence);
             for lane in (0..live).filter(|&lane| packets.any(lane)) {

@@ -1,12 +1,20 @@
 //! A ray prepared once for boxes and triangles, four at a time.
+//!
+//! In the scene a ray is f32 and exact. In the space of a placed mesh it is f64: boxes and the
+//! filter see it rounded, which their bounds account for, the f64 test sees it as it is.
 
 use super::bvh::{Block, Node};
+use super::traverse::Space;
 use crate::geom::Ray;
 use crate::geom::triangle::ShearedRay;
-use glam::{Vec3, Vec4};
+use glam::{DVec3, Vec3, Vec4};
 
 /// What box tests may be off by, as a factor: a difference, a reciprocal and a product are
 /// three roundings of 2^-24 at each end of the interval, 2^-20 is above both together.
+///
+/// In the space of a placed mesh the direction is rounded as well, and the origin o. Unless
+/// |o| > 2 |side|, half an ulp of o is at most one of the side, by which boxes are wider than they
+/// need be; else it is at most 2^-23 of the difference, and both ends together still stay below.
 ///
 /// Source: T. Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013.
 pub(super) const SLACK: f32 = 1.0 + 1.0 / (1 << 20) as f32;
@@ -40,21 +48,44 @@ pub(super) struct TriangleRay {
     /// Origin in the order of the sheared axes.
     o: [f32; 3],
     shear: [f32; 2],
+    /// What the rounding of the origin moves sheared coordinates by, at most.
+    off: f32,
 }
 
 /// Prepares `ray`; `None` where it meets nothing because it has no direction, is not finite
 /// or ends before it begins.
+#[inline(always)]
 pub(super) fn prepare(ray: &Ray) -> Option<(BoxRay, TriangleRay)> {
     let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
-    let longest = d.abs().max_element();
-    if !(o.is_finite() && d.is_finite() && longest > 0.0 && ray.t_near < ray.t_far) {
+    let unit = unit(o, d).filter(|_| ray.t_near < ray.t_far)?;
+    let (t_near, t_far) = interval(ray);
+    let boxes = BoxRay::new(ray.o, (d * (1.0 / unit)).as_vec3(), t_near, unit);
+    Some((boxes, TriangleRay::new(ray.o, ShearedRay::new(o, d, t_near, t_far), 0.0)))
+}
+
+/// The same for a ray in the space of a placed mesh and the `t` between two; `None` as well for one
+/// that starts beyond f32, where the mesh is a speck.
+pub(super) fn prepare_placed(o: DVec3, d: DVec3, t_near: f64, t_far: f64) -> Option<(BoxRay, TriangleRay)> {
+    let unit = unit(o, d)?;
+    // What is shorter cannot move a hit, and its reciprocal would not fit.
+    let scaled = d * (1.0 / unit);
+    let scaled = DVec3::select(scaled.abs().cmplt(DVec3::splat(f32::MIN_POSITIVE.into())), DVec3::ZERO, scaled);
+    let near = o.as_vec3();
+    if !near.is_finite() {
         return None;
     }
-    // The power of two at or below the largest component: scaling by it is exact.
-    let unit = f64::from_bits(longest.to_bits() & (0x7ff << 52));
-    let (t_near, t_far) = interval(ray);
-    let exact = ShearedRay::new(o, d, t_near, t_far);
-    Some((BoxRay::new(ray, (d * (1.0 / unit)).as_vec3(), unit), TriangleRay::new(ray, exact)))
+    let boxes = BoxRay::new(near, scaled.as_vec3(), t_near, unit);
+    // Half an ulp of x or y and as much of z, sheared; twice that, as for the other bounds.
+    let off = near.abs().max_element() * (2.0 * f32::EPSILON);
+    Some((boxes, TriangleRay::new(near, ShearedRay::new(o, scaled * unit, t_near, t_far), off)))
+}
+
+/// The power of two at or below the largest component of `d`: scaling by it is exact. `None`
+/// where the ray is not finite or has no direction.
+fn unit(o: DVec3, d: DVec3) -> Option<f64> {
+    let longest = d.abs().max_element();
+    let usable = o.is_finite() && d.is_finite() && longest >= f64::MIN_POSITIVE;
+    usable.then(|| f64::from_bits(longest.to_bits() & (0x7ff << 52)))
 }
 
 /// All `t` that lie between `t_near` and `t_far` once they are rounded to f32.
@@ -68,18 +99,13 @@ fn interval(ray: &Ray) -> (f64, f64) {
 
 impl BoxRay {
     /// `d` is the ray's direction divided by `unit`.
-    fn new(ray: &Ray, d: Vec3, unit: f64) -> Self {
+    fn new(o: Vec3, d: Vec3, t_near: f64, unit: f64) -> Self {
         // Infinite where the ray is parallel to the sides. A box side through the origin
         // then gives NaN, and lanes with NaN may turn out either way: boxes are wider than
         // what is in them, so an origin on a side is outside of that.
         let inv_d = d.recip().to_array();
-        Self {
-            o: ray.o.to_array(),
-            inv_d,
-            near: inv_d.map(|i| u8::from(i.is_sign_negative())),
-            t_near: ((f64::from(ray.t_near) * unit) as f32).next_down(),
-            unit,
-        }
+        let near = inv_d.map(|i| u8::from(i.is_sign_negative()));
+        Self { o: o.to_array(), inv_d, near, t_near: ((t_near * unit) as f32).next_down(), unit }
     }
 
     /// Whether both meet the same sides of boxes first, run parallel to none, and count `t`
@@ -121,8 +147,8 @@ impl BoxRay4 {
 }
 
 impl TriangleRay {
-    fn new(ray: &Ray, exact: ShearedRay) -> Self {
-        Self { exact, o: exact.axes().map(|axis| ray.o[axis]), shear: exact.shear().map(|s| s as f32) }
+    fn new(o: Vec3, exact: ShearedRay, off: f32) -> Self {
+        Self { exact, o: exact.axes().map(|axis| o[axis]), shear: exact.shear().map(|s| s as f32), off }
     }
 
     /// Bits of the lanes of `block` that the ray's line may meet: all that the f64 test
@@ -134,9 +160,9 @@ impl TriangleRay {
     /// difference not above s + z, three of a product not above z, one of the result), an
     /// edge function by less than 4 d s + 2 d^2 + 4e s^2 <= 5 d (s + d), to which the
     /// smallest normal float is added for products that vanish. Where a bound overflows
-    /// nothing is turned away.
+    /// nothing is turned away. An origin that was rounded adds to d.
     #[inline]
-    pub(super) fn candidates(&self, block: &Block) -> u32 {
+    pub(super) fn candidates<S: Space>(&self, block: &Block) -> u32 {
         let [x, y, z] = self.exact.axes();
         let project = |corner: &[Vec4; 3]| {
             let along = corner[z] - self.o[2];
@@ -152,6 +178,7 @@ impl TriangleRay {
         let w = bx * ay - by * ax;
         let s = a.max(b).max(c);
         let d = (s + az.max(bz).max(cz)) * (8.0 / (1 << 24) as f32);
+        let d = if S::PLACED { d + self.off } else { d };
         let bound = d * (s + d) * 6.0 + f32::MIN_POSITIVE;
         let least = u.min(v).min(w);
         let most = u.max(v).max(w);
@@ -162,6 +189,7 @@ impl TriangleRay {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::backend::native::world::World;
     use crate::geom::triangle;
     use proptest::prelude::*;
 
@@ -186,7 +214,7 @@ mod tests {
             let corners = t.map(|p| p * unit);
             block.set(2, corners, 7);
             if triangle::intersect(&triangles.exact, corners).is_some() {
-                prop_assert!(triangles.candidates(&block) & 0b100 != 0);
+                prop_assert!(triangles.candidates::<World>(&block) & 0b100 != 0);
             }
         }
     }
@@ -201,7 +229,7 @@ mod tests {
         for lane in 0..4 {
             let ray = Ray::new(Vec3::new(lane as f32 + 0.3, 0.3, 0.0), Vec3::Z);
             let (_, triangles) = prepare(&ray).expect("finite");
-            assert_eq!(triangles.candidates(&block), 1 << lane);
+            assert_eq!(triangles.candidates::<World>(&block), 1 << lane);
         }
     }
 

@@ -1,89 +1,152 @@
-//! The way of one ray through the hierarchy.
+//! The way of one ray through a hierarchy.
 
-use super::bvh::{Bvh, Child, MAX_DEPTH, WIDTH};
-use super::ray::{BoxRay, BoxRay4, TriangleRay, prepare};
+use super::bvh::{Block, Bvh, Child, MAX_DEPTH, WIDTH};
+use super::ray::{BoxRay, BoxRay4, TriangleRay, prepare, prepare_placed};
 use crate::geom::Ray;
 use crate::geom::triangle::{self, TriangleHit};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// A child that is still to be visited, and where the ray enters it.
 pub(super) type Waiting = (f32, Child);
 
 /// Most children that wait at once in any tree: all but one of each node on the way.
-const STACK: usize = (WIDTH - 1) * MAX_DEPTH;
+pub(super) const STACK: usize = (WIDTH - 1) * MAX_DEPTH;
 
 /// Enough for nearly every tree, and quicker to make.
 pub(super) const SMALL_STACK: usize = 63;
 
-/// The nearest triangle, by its number.
-pub(super) struct Found {
-    pub(super) t: f32,
-    pub(super) u: f32,
-    pub(super) v: f32,
-    pub(super) ng: Vec3,
-    pub(super) id: u32,
+/// Where rays are traced: in the scene, or in the space of a placed mesh.
+pub(super) trait Space {
+    /// Whether rays come from another space, so that their origins are rounded to f32.
+    const PLACED: bool;
+
+    /// What packets need to test things that have leaves to themselves.
+    type Tools;
+
+    fn bvh(&self) -> &Bvh;
+
+    /// Tests `apart[index]` of the hierarchy; whether it is the best hit now. `stack` is free
+    /// to use.
+    fn apart<const ANY: bool>(&self, walk: &mut Walk, index: usize, stack: &mut [Waiting]) -> bool;
+
+    /// The same for the rays of `lanes`: bits of those for which it is the best hit now.
+    fn apart_together<const ANY: bool>(
+        &self,
+        index: usize,
+        lanes: u32,
+        walks: &mut [Option<Walk>],
+        stack: &mut [Waiting],
+        tools: &mut Self::Tools,
+    ) -> u32;
 }
 
 /// The best hit so far.
-struct Best {
-    hit: TriangleHit,
-    id: u32,
-    block: usize,
-    lane: usize,
+#[derive(Clone, Copy)]
+pub(super) struct Best {
+    pub(super) hit: TriangleHit,
+    /// Number of what was hit. Of a triangle in a placed mesh it is the mesh's.
+    pub(super) id: u32,
+    /// The triangle, if it is one.
+    pub(super) at: Slot,
+}
+
+/// Where a triangle is: block and lane.
+#[derive(Clone, Copy)]
+pub(super) struct Slot(u32, u32);
+
+impl Slot {
+    /// Of what is no triangle.
+    pub(super) const NONE: Self = Self(u32::MAX, 0);
+
+    /// Number of the triangle.
+    pub(super) fn id(self, bvh: &Bvh) -> u32 {
+        bvh.blocks[self.0 as usize].id[self.1 as usize]
+    }
+
+    /// Normal of the triangle as wound, in units of the coordinates squared.
+    #[inline]
+    pub(super) fn normal(self, bvh: &Bvh) -> DVec3 {
+        let [a, b, c] = bvh.blocks[self.0 as usize].triangle(self.1 as usize).map(Vec3::as_dvec3);
+        (b - a).cross(c - a)
+    }
 }
 
 /// A ray on its way.
 pub(super) struct Walk {
     pub(super) boxes: BoxRay,
     triangles: TriangleRay,
+    /// Direction as given.
+    d: Vec3,
     best: Option<Best>,
     /// The `t`, as boxes count it, from where on nothing matters.
     pub(super) cull: f32,
 }
 
-impl Bvh {
-    /// The nearest hit of `ray`; the lowest number among equal `t`.
-    pub(super) fn nearest(&self, ray: &Ray) -> Option<Found> {
-        let mut walk = Walk::new(ray)?;
-        self.walk::<false>(&mut walk);
-        walk.found(self)
-    }
-
-    /// Whether `ray` meets anything.
-    pub(super) fn any(&self, ray: &Ray) -> bool {
-        Walk::new(ray).is_some_and(|mut walk| self.walk::<true>(&mut walk))
-    }
-
-    #[inline]
-    fn walk<const ANY: bool>(&self, walk: &mut Walk) -> bool {
-        match self.stack_len() {
-            0 => false,
-            1..=SMALL_STACK => walk.descend::<ANY>(self, Child::ROOT, &mut [(0.0, Child::NONE); SMALL_STACK]),
-            _ => walk.descend::<ANY>(self, Child::ROOT, &mut [(0.0, Child::NONE); STACK]),
-        }
-    }
-
-    /// Most children that wait at once in this tree.
-    pub(super) fn stack_len(&self) -> usize {
-        (WIDTH - 1) * self.depth
-    }
-}
-
 impl Walk {
     /// `None` for a ray that meets nothing whatever there is.
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(ray: &Ray) -> Option<Self> {
-        let (boxes, triangles) = prepare(ray)?;
+        Some(Self::prepared(prepare(ray)?, ray.d))
+    }
+
+    /// The ray from `o` along `d` in the space of a placed mesh, up to the best hit so far.
+    #[inline]
+    pub(super) fn placed(&self, o: DVec3, d: DVec3) -> Option<Self> {
+        let (t_near, t_far) = self.interval();
+        Some(Self::prepared(prepare_placed(o, d, t_near, t_far)?, Vec3::ZERO))
+    }
+
+    #[inline(always)]
+    fn prepared((boxes, triangles): (BoxRay, TriangleRay), d: Vec3) -> Self {
         let cull = boxes.cull(triangles.exact.t_far);
-        Some(Self { boxes, triangles, best: None, cull })
+        Self { boxes, triangles, d, best: None, cull }
+    }
+
+    /// Origin and direction of a ray in the scene.
+    #[inline]
+    pub(super) fn ray(&self) -> (DVec3, DVec3) {
+        (Vec3::from(self.boxes.o).as_dvec3(), self.d.as_dvec3())
+    }
+
+    /// The open interval of `t` that is left.
+    #[inline]
+    pub(super) fn interval(&self) -> (f64, f64) {
+        (self.triangles.exact.t_near, self.triangles.exact.t_far)
+    }
+
+    /// The best hit.
+    #[inline]
+    pub(super) fn best(&self) -> Option<&Best> {
+        self.best.as_ref()
+    }
+
+    /// Takes a hit inside the interval if it is better; whether it was.
+    #[inline]
+    pub(super) fn offer(&mut self, hit: Best) -> bool {
+        let better = self.keep(hit);
+        if better {
+            self.cull = self.boxes.cull(self.triangles.exact.t_far);
+        }
+        better
+    }
+
+    #[inline]
+    fn keep(&mut self, hit: Best) -> bool {
+        let better = self.best.is_none_or(|b| hit.hit.t < b.hit.t || hit.id < b.id);
+        if better {
+            // Just past it, so that an equal `t` with a lower number still passes.
+            self.triangles.exact.t_far = hit.hit.t.next_up();
+            self.best = Some(hit);
+        }
+        better
     }
 
     /// Visits all below `from`; whether the ray met anything there. With `ANY` it stops at
     /// the first hit.
     #[inline]
-    pub(super) fn descend<const ANY: bool>(&mut self, bvh: &Bvh, from: Child, stack: &mut [Waiting]) -> bool {
+    pub(super) fn descend<const ANY: bool, S: Space>(&mut self, space: &S, from: Child, stack: &mut [Waiting]) -> bool {
         if from.is_leaf() {
-            return self.leaf(bvh, from);
+            return self.leaf::<ANY, S>(space, from, stack);
         }
         let boxes = self.boxes.splat();
         let mut met = false;
@@ -91,11 +154,11 @@ impl Walk {
         let mut child = from;
         loop {
             if child.is_leaf() {
-                met |= self.leaf(bvh, child);
+                met |= self.leaf::<ANY, S>(space, child, &mut stack[waiting..]);
                 if ANY && met {
                     return true;
                 }
-            } else if let Some(next) = nearest_child(bvh, child, &boxes, self.cull, stack, &mut waiting) {
+            } else if let Some(next) = nearest_child(space, child, &boxes, self.cull, stack, &mut waiting) {
                 child = next;
                 continue;
             }
@@ -113,61 +176,47 @@ impl Walk {
         }
     }
 
-    /// Tests the triangles of a leaf; whether one of them is the best now.
+    /// Tests what is in a leaf; whether something there is the best now.
     #[inline]
-    fn leaf(&mut self, bvh: &Bvh, leaf: Child) -> bool {
-        let index = leaf.block_index();
-        let block = &bvh.blocks[index];
-        let mut lanes = self.triangles.candidates(block) & leaf.lanes();
-        let exact = &mut self.triangles.exact;
+    fn leaf<const ANY: bool, S: Space>(&mut self, space: &S, leaf: Child, stack: &mut [Waiting]) -> bool {
+        let (index, blocks) = (leaf.leaf_index(), &space.bvh().blocks);
+        match blocks.get(index) {
+            Some(block) => self.block::<S>(block, index, leaf.lanes()),
+            None => space.apart::<ANY>(self, index - blocks.len(), stack),
+        }
+    }
+
+    #[inline(always)]
+    fn block<S: Space>(&mut self, block: &Block, index: usize, lanes: u32) -> bool {
+        let mut lanes = self.triangles.candidates::<S>(block) & lanes;
         let mut better = false;
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % WIDTH;
             lanes &= lanes - 1;
+            let exact = &self.triangles.exact;
             let Some(hit) = triangle::intersect_permuted(exact, block.permuted(lane, exact.axes())) else {
                 continue;
             };
-            let id = block.id[lane];
-            if self.best.as_ref().is_none_or(|b| hit.t < b.hit.t || id < b.id) {
-                // Just past it, so that an equal `t` with a lower number still passes.
-                exact.t_far = hit.t.next_up();
-                self.best = Some(Best { hit, id, block: index, lane });
-                better = true;
-            }
+            better |= self.keep(Best { hit, id: block.id[lane], at: Slot(index as u32, lane as u32) });
         }
         if better {
             self.cull = self.boxes.cull(self.triangles.exact.t_far);
         }
         better
     }
-
-    /// Whether there is a hit.
-    pub(super) fn has_met(&self) -> bool {
-        self.best.is_some()
-    }
-
-    /// The best hit.
-    pub(super) fn found(&self, bvh: &Bvh) -> Option<Found> {
-        let best = self.best.as_ref()?;
-        let triangle = bvh.blocks[best.block].triangle(best.lane);
-        let TriangleHit { t, u, v } = best.hit;
-        // A `t` beyond f32 is still a hit, and inside every interval without end.
-        let t = (t as f32).min(f32::MAX);
-        Some(Found { t, u: u as f32, v: v as f32, ng: normal(triangle), id: best.id })
-    }
 }
 
 /// Nearest child that the ray enters; the others wait, farthest first.
 #[inline]
-fn nearest_child(
-    bvh: &Bvh,
+fn nearest_child<S: Space>(
+    space: &S,
     node: Child,
     boxes: &BoxRay4,
     cull: f32,
     stack: &mut [Waiting],
     waiting: &mut usize,
 ) -> Option<Child> {
-    let node = &bvh.nodes[node.node_index()];
+    let node = &space.bvh().nodes[node.node_index()];
     let (mut lanes, enter) = boxes.enter(node, cull);
     if lanes == 0 {
         return None;
@@ -194,13 +243,4 @@ fn nearest_child(
         *waiting += 1;
     }
     Some(nearest.1)
-}
-
-/// Geometric normal as wound: in units of the coordinates squared, unless that is too
-/// small for f32; then of length about 1.
-fn normal(triangle: [Vec3; 3]) -> Vec3 {
-    let [a, b, c] = triangle.map(Vec3::as_dvec3);
-    let ng = (b - a).cross(c - a);
-    let largest = ng.abs().max_element();
-    if largest < 1e-30 { (ng / largest).as_vec3() } else { ng.as_vec3() }
 }

@@ -3,16 +3,14 @@
 //! The same film gives the same bytes, with any number of threads: nothing in a file tells
 //! the time, the place or who made it.
 
-mod display;
 mod exr;
 mod float;
 mod png;
+mod visible;
 
 use super::save::{SaveError, Sink, save};
-use super::{Aov, AovImage, Film, Format};
-use crate::math::colour::Srgb8;
+use super::{Aov, AovImage, Display, Film, Format, Tonemap};
 use ::image::{ExtendedColorType, ImageEncoder, codecs};
-use rayon::prelude::*;
 use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -41,13 +39,19 @@ pub fn files(path: &Path, format: Format, aovs: &[Aov]) -> Vec<PathBuf> {
 /// # Errors
 ///
 /// As [`save`], at the first file that fails.
-pub fn save_all(film: &Film, path: &Path, format: Format, notes: &Notes) -> Result<Vec<(PathBuf, u64)>, SaveError> {
-    let bytes = save(path, |out| encode(film, format, notes, out))?;
+pub fn save_all(
+    film: &Film,
+    path: &Path,
+    format: Format,
+    display: &Display,
+    notes: &Notes,
+) -> Result<Vec<(PathBuf, u64)>, SaveError> {
+    let bytes = save(path, |out| encode(film, format, display, notes, out))?;
     let mut written = vec![(path.to_owned(), bytes)];
     let own: &[AovImage] = if format.holds_aovs() { &[] } else { &film.aovs };
     for aov in own {
         let path = aov_path(path, aov.kind);
-        let bytes = save(&path, |out| encode_aov(film, aov, format, notes, out))?;
+        let bytes = save(&path, |out| encode_aov(film, aov, format, display, notes, out))?;
         written.push((path, bytes));
     }
     Ok(written)
@@ -58,7 +62,7 @@ pub fn save_all(film: &Film, path: &Path, format: Format, notes: &Notes) -> Resu
 /// # Errors
 ///
 /// Those of the sink, and of the format (a JPEG has at most 65535 pixels a side).
-pub fn encode(film: &Film, format: Format, notes: &Notes, out: &mut dyn Sink) -> io::Result<()> {
+pub fn encode(film: &Film, format: Format, display: &Display, notes: &Notes, out: &mut dyn Sink) -> io::Result<()> {
     let (width, height) = (film.width, film.height);
     match format {
         Format::Exr => {
@@ -67,15 +71,26 @@ pub fn encode(film: &Film, format: Format, notes: &Notes, out: &mut dyn Sink) ->
         }
         Format::Hdr => float::hdr(width, height, &film.color, out),
         Format::Pfm => float::pfm(width, 3, film.color.as_flattened(), out),
-        _ => eight_bit(width, height, &srgb_bytes(&film.color), Meaning::Colour, format, notes, out),
+        _ => {
+            // Stretched values are on no curve that a viewer knows.
+            let meaning = if display.tonemap == Tonemap::Stretch { Meaning::Data } else { Meaning::Colour };
+            eight_bit(width, height, &display.bytes(&film.color), meaning, format, notes, out)
+        }
     }
 }
 
 /// Writes one auxiliary image.
 ///
 /// PFM and EXR hold the values themselves (in PFM ids are the floats object, primitive, 0, exact up to 2^24). The others
-/// show them: `display` says how.
-fn encode_aov(film: &Film, aov: &AovImage, format: Format, notes: &Notes, out: &mut dyn Sink) -> io::Result<()> {
+/// show them: `visible` says how.
+fn encode_aov(
+    film: &Film,
+    aov: &AovImage,
+    format: Format,
+    display: &Display,
+    notes: &Notes,
+    out: &mut dyn Sink,
+) -> io::Result<()> {
     let (width, height) = (film.width, film.height);
     match format {
         Format::Exr => exr::write(width, height, exr::aov_channels(aov), notes, out),
@@ -90,10 +105,10 @@ fn encode_aov(film: &Film, aov: &AovImage, format: Format, notes: &Notes, out: &
             float::pfm(width, 3, padded.as_flattened(), out)
         }
         Format::Pfm => float::pfm(width, aov.kind.channels(), &aov.data, out),
-        Format::Hdr => float::hdr(width, height, &display::linear(aov), out),
+        Format::Hdr => float::hdr(width, height, &visible::linear(aov), out),
         _ => {
             let meaning = if aov.kind == Aov::Albedo { Meaning::Colour } else { Meaning::Data };
-            eight_bit(width, height, &display::bytes(aov), meaning, format, notes, out)
+            eight_bit(width, height, &visible::bytes(aov, display), meaning, format, notes, out)
         }
     }
 }
@@ -113,14 +128,6 @@ fn aov_path(path: &Path, kind: Aov) -> PathBuf {
 enum Meaning {
     Colour,
     Data,
-}
-
-/// Pixels that one task converts: enough to be worth a task, few enough to share out.
-const CHUNK: usize = 1 << 14;
-
-fn srgb_bytes(color: &[[f32; 3]]) -> Vec<[u8; 3]> {
-    let table = Srgb8::table();
-    color.par_iter().with_min_len(CHUNK).map(|&c| table.rgb(c)).collect()
 }
 
 fn eight_bit(

@@ -31,7 +31,7 @@ fn notes() -> Notes {
 
 fn encoded(film: &Film, format: Format) -> Vec<u8> {
     let mut out = Cursor::new(Vec::new());
-    encode(film, format, &notes(), &mut out).unwrap();
+    encode(film, format, &Display::default(), &notes(), &mut out).unwrap();
     out.into_inner()
 }
 
@@ -51,6 +51,31 @@ fn lossless_8_bit_formats_hold_the_curve_of_each_pixel() {
         assert_eq!((read.width(), read.height()), (5, 3), "{format:?}");
         assert_eq!(read.as_raw(), &srgb(&film), "{format:?}");
     }
+}
+
+#[test]
+fn stretching_changes_8_bit_formats_and_no_other() {
+    let film = film();
+    let with = |format, tonemap| {
+        let mut out = Cursor::new(Vec::new());
+        encode(&film, format, &Display { tonemap, exposure: 0.0, depth_range: None }, &notes(), &mut out).unwrap();
+        out.into_inner()
+    };
+    for format in [Format::Png, Format::Bmp, Format::Ppm, Format::Jpeg] {
+        assert!(with(format, Tonemap::Stretch) != with(format, Tonemap::None), "{format:?}");
+    }
+    for format in [Format::Exr, Format::Hdr, Format::Pfm] {
+        assert!(with(format, Tonemap::Stretch) == with(format, Tonemap::None), "{format:?}");
+    }
+    let read = image::load_from_memory(&with(Format::Png, Tonemap::Stretch)).unwrap().to_rgb8();
+    // The film runs from 0 to a hair above 1.7, in blue.
+    assert_eq!(read.as_raw()[..3], [0, 149, 45]);
+    assert_eq!(read.as_raw()[42..], [149, 0, 255]);
+    let info = |tonemap| {
+        let bytes = with(Format::Png, tonemap);
+        ::png::Decoder::new(Cursor::new(bytes)).read_info().unwrap().info().srgb.is_some()
+    };
+    assert!(info(Tonemap::None) && !info(Tonemap::Stretch), "what is stretched is on no curve");
 }
 
 #[test]
@@ -153,7 +178,7 @@ fn each_auxiliary_image_has_its_own_file_unless_the_format_holds_them() {
     for (name, count) in [("a.png", 7), ("b.pfm", 7), ("c.exr", 1), ("d.hdr", 7)] {
         let path = dir.path().join(name);
         let format = Format::of(&path).unwrap();
-        let written = save_all(&film, &path, format, &notes()).unwrap();
+        let written = save_all(&film, &path, format, &Display::default(), &notes()).unwrap();
         let named: Vec<_> = written.iter().map(|(p, _)| p.clone()).collect();
         assert_eq!(named, files(&path, format, &Aov::ALL), "{name}");
         assert_eq!(named.len(), count, "{name}");

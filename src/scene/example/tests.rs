@@ -241,3 +241,17 @@ fn no_normal_of_the_ember_turns_from_its_triangle() {
         assert!(face.iter().all(|&id| flat.dot(normals[id]) > 0.0), "{face:?}");
     }
 }
+
+#[test]
+fn the_first_scene_has_one_of_each_and_nothing_odd() {
+    use crate::scene::desc::ShapeDesc;
+    use crate::scene::format::{ReadOptions, parse};
+    let path = std::path::Path::new("scene.toml");
+    let (scene, warnings) = parse(path, FIRST_SCENE.as_bytes(), &ReadOptions::default()).expect("it is right");
+    assert!(warnings.is_empty(), "{warnings:?}");
+    let has = |f: fn(&ShapeDesc) -> bool| scene.objects.iter().any(|o| f(&o.shape));
+    assert!(has(|s| matches!(s, ShapeDesc::Sphere { .. })) && has(|s| matches!(s, ShapeDesc::Cube { .. })));
+    assert!(has(|s| matches!(s, ShapeDesc::Cylinder { .. })) && has(|s| matches!(s, ShapeDesc::Quad { .. })));
+    assert!(scene.cameras[0].camera.aperture > 0.0 && scene.lights.iter().any(|l| l.radius > 0.0));
+    assert!(scene.materials.iter().all(|m| scene.objects.iter().any(|o| o.material.as_ref() == Some(&m.name))));
+}

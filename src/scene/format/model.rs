@@ -17,14 +17,6 @@ pub(super) const MOST_RECURSION: u32 = 100_000;
 /// Vertical field of view where a perspective camera gives none, in degrees.
 const DEFAULT_FOV: f64 = 40.0;
 
-/// Words of `lens_sampler`.
-pub(super) const LENS_SAMPLERS: [(&str, LensSampler); 4] = [
-    ("concentric", LensSampler::Concentric),
-    ("polar", LensSampler::Polar),
-    ("rejection", LensSampler::Rejection),
-    ("polar-uniform-radius", LensSampler::PolarUniformRadius),
-];
-
 /// The scene that the groups of [`super::include::join`] describe.
 pub(super) fn read(ctx: &Context, root: &[Entry]) -> SceneDesc {
     let mut desc = SceneDesc { files: ctx.paths(), ..SceneDesc::default() };
@@ -81,7 +73,7 @@ fn render(ctx: &Context, entry: &Entry) -> RenderDesc {
         background: t.opt("background").and_then(|f| f.color()),
         ambient: t.opt("ambient").and_then(|f| f.color()),
         jitter_radius: t.opt("jitter_radius").and_then(|f| f.number(radius, |x| (0.0..=16.0).contains(&x))),
-        lens_sampler: t.opt("lens_sampler").and_then(|f| f.choice(&LENS_SAMPLERS)),
+        lens_sampler: t.opt("lens_sampler").and_then(|f| f.choice(&LensSampler::ALL.map(|s| (s.name(), s)))),
         course_rules: t.opt("course_rules").and_then(|f| f.bool()).unwrap_or(false),
     };
     t.finish();

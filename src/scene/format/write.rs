@@ -1,6 +1,5 @@
 //! A scene as TOML text.
 
-use super::model::LENS_SAMPLERS;
 use crate::scene::Projection;
 use crate::scene::desc::{
     Falloff, LightDesc, MaterialDesc, NamedCamera, ObjectDesc, ReflectDesc, RenderDesc, SceneDesc, ShapeDesc,
@@ -67,8 +66,7 @@ impl Writer {
         self.opt("ambient", r.ambient);
         self.opt("jitter_radius", r.jitter_radius);
         if let Some(sampler) = r.lens_sampler {
-            let word = LENS_SAMPLERS.iter().find(|(_, s)| *s == sampler).expect("every sampler has a word");
-            self.text("lens_sampler", word.0);
+            self.text("lens_sampler", sampler.name());
         }
         if r.course_rules {
             self.key("course_rules", true);
@@ -159,7 +157,7 @@ impl Writer {
                 self.text("shape", "quad");
                 self.key("half", half);
             }
-            ShapeDesc::Mesh { path, smooth } => {
+            ShapeDesc::Mesh { path, smooth, .. } => {
                 self.path("mesh", path);
                 self.opt("smooth", *smooth);
             }

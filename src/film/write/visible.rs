@@ -2,7 +2,7 @@
 //!
 //! | image | 8-bit | Radiance HDR |
 //! |---|---|---|
-//! | depth | nearest white to farthest dark grey, black where nothing was hit | distance, 0 where nothing was hit |
+//! | depth | nearest white to farthest dark grey, black where nothing was hit; or [`Display::depth_range`] | distance, 0 where nothing was hit |
 //! | normal | `0.5 + 0.5 n`; mid-grey where nothing was hit | the same |
 //! | albedo | sRGB | linear |
 //! | id | a colour for each pair of object and primitive, black where nothing was hit | the same |
@@ -11,14 +11,22 @@
 //!
 //! Only albedo is bent by the sRGB curve; elsewhere equal steps of the value are equal steps of the byte.
 
-use super::srgb_bytes;
-use crate::film::{Aov, AovImage};
+use crate::film::tone::{Range, srgb_bytes};
+use crate::film::{Aov, AovImage, Display, Tonemap};
 
 /// The grey of the farthest hit: darker than any nearer one, and not the black of a miss.
 const FARTHEST: f32 = 32.0;
 
 /// As 8-bit RGB.
-pub fn bytes(aov: &AovImage) -> Vec<[u8; 3]> {
+pub fn bytes(aov: &AovImage, display: &Display) -> Vec<[u8; 3]> {
+    let values = &aov.data;
+    match (aov.kind, display.depth_range) {
+        (Aov::Depth, Some(range)) if display.tonemap == Tonemap::Stretch => stretched_depth(values, range),
+        _ => plain_bytes(aov),
+    }
+}
+
+fn plain_bytes(aov: &AovImage) -> Vec<[u8; 3]> {
     let values = &aov.data;
     match aov.kind {
         Aov::Depth => depth(values),
@@ -68,6 +76,13 @@ fn depth(values: &[f32]) -> Vec<[u8; 3]> {
     values.iter().map(|&d| [grey(d); 3]).collect()
 }
 
+/// Each depth as its share of the way from `near` to `far`, 0 for a miss, all of them stretched.
+fn stretched_depth(values: &[f32], (near, far): (f64, f64)) -> Vec<[u8; 3]> {
+    let share = |d: f32| if d.is_finite() { (f64::from(d) - near) / (far - near) } else { 0.0 };
+    let range = values.iter().fold(Range::EMPTY, |r, &d| r.with(share(d)));
+    values.iter().map(|&d| [range.byte(share(d)); 3]).collect()
+}
+
 /// 0..=1 to 0..=255; `as` saturates and takes NaN to 0.
 fn step(share: f32) -> u8 {
     (255.0 * share).round_ties_even() as u8
@@ -96,6 +111,30 @@ mod tests {
 
     fn image(kind: Aov, data: &[f32]) -> AovImage {
         AovImage { kind, data: data.to_vec() }
+    }
+
+    fn bytes(aov: &AovImage) -> Vec<[u8; 3]> {
+        super::bytes(aov, &Display::default())
+    }
+
+    #[test]
+    fn depth_of_a_stretched_picture_grows_from_the_near_plane() {
+        let stretched = |tonemap, depth_range, data: &[f32]| {
+            super::bytes(&image(Aov::Depth, data), &Display { tonemap, exposure: 0.0, depth_range })
+        };
+        let range = Some((1.0, 101.0));
+        let stretch = |data: &[f32]| stretched(Tonemap::Stretch, range, data);
+        let miss = f32::INFINITY;
+        // Shares 0, 0.01, 0.02 and 0.04 of the way; the farthest hit is white.
+        assert_eq!(stretch(&[miss, 2.0, 3.0, 5.0]), [[0; 3], [63; 3], [127; 3], [255; 3]]);
+        assert_eq!(stretch(&[2.0, 3.0, 5.0]), [[0; 3], [85; 3], [255; 3]], "nothing was missed: the nearest is black");
+        assert_eq!(stretch(&[miss, 3.0]), [[0; 3], [255; 3]]);
+        for constant in [miss, 3.0] {
+            assert_eq!(stretch(&[constant; 2]), [[0; 3]; 2]);
+        }
+        let usual = bytes(&image(Aov::Depth, &[2.0, 3.0]));
+        assert_eq!(stretched(Tonemap::Stretch, None, &[2.0, 3.0]), usual, "no planes to measure between");
+        assert_eq!(stretched(Tonemap::None, range, &[2.0, 3.0]), usual, "another curve");
     }
 
     #[test]

@@ -1,32 +1,15 @@
-//! The native tracer against a loop over all triangles, and against what must hold for
-//! every mesh: no leak, no order, no scale.
+//! Triangle meshes against a loop over all triangles, and against what must hold for every
+//! mesh: no leak, no order, no scale.
 
+use crate::kit::{Numbers, ball, batches, built, bumpy, check_batches, key, mesh, objects, round, soup};
 use glam::Vec3;
 use proptest::prelude::*;
-use std::collections::HashMap;
-use std::f32::consts::TAU;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use tison::backend::Backend;
 use tison::backend::native::{BuildError, BuildOptions, Native, Quality};
 use tison::geom::triangle::{self, ShearedRay};
-use tison::geom::{BAD_FACE, Coherence, Hit, PacketBatch, Ray, RayHitPacket, RayPacket, TriangleMesh};
-
-static NEVER: AtomicBool = AtomicBool::new(false);
-
-fn built(meshes: &[Arc<TriangleMesh>], quality: Quality) -> Native {
-    Native::build(meshes, &BuildOptions { quality, cancel: &NEVER }).expect("never cancelled")
-}
-
-fn mesh(points: &[Vec3], faces: Vec<[u32; 3]>) -> Arc<TriangleMesh> {
-    Arc::new(TriangleMesh::new(points.iter().flat_map(|p| p.to_array()).collect(), faces))
-}
-
-/// Three points per triangle, nothing shared.
-fn soup(triangles: &[[Vec3; 3]]) -> Arc<TriangleMesh> {
-    let faces = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    mesh(triangles.as_flattened(), faces)
-}
+use tison::geom::{BAD_FACE, Hit, Ray, TriangleMesh};
 
 /// Whether the ray lies in the triangle's plane as far as f64 can tell.
 fn edge_on(ray: &Ray, [a, b, c]: [Vec3; 3]) -> bool {
@@ -60,60 +43,6 @@ fn brute_force_if(
         }
     }
     best.map(|(t, geom, prim)| (t as f32, geom, prim))
-}
-
-fn key(hit: Option<Hit>) -> Option<(f32, u32, u32)> {
-    hit.map(|h| (h.t, h.geom_id, h.prim_id))
-}
-
-/// A closed sphere-like mesh: an octahedron with every edge cut in `n`, 8 n^2 triangles.
-fn ball(n: i64, radius: impl Fn(Vec3) -> f32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    let (mut points, mut faces, mut known) = (Vec::new(), Vec::new(), HashMap::new());
-    let mut vertex = |p: [i64; 3]| {
-        *known.entry(p).or_insert_with(|| {
-            let d = Vec3::from(p.map(|x| x as f32)).normalize();
-            points.push(d * radius(d));
-            points.len() as u32 - 1
-        })
-    };
-    for [x, y, z] in (0..8).map(|s| [0, 1, 2].map(|axis| 1 - 2 * (s >> axis & 1))) {
-        let mut at = |i: i64, j: i64| vertex([x * i, y * j, z * (n - i - j)]);
-        for (i, j) in (0..n).flat_map(|i| (0..n - i).map(move |j| (i, j))) {
-            faces.push([at(i, j), at(i + 1, j), at(i, j + 1)]);
-            if i + j + 1 < n {
-                faces.push([at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
-            }
-        }
-    }
-    (points, faces)
-}
-
-fn round(_: Vec3) -> f32 {
-    1.0
-}
-
-fn bumpy(d: Vec3) -> f32 {
-    1.0 + 0.05 * (9.0 * d.x).sin() * (11.0 * d.y + 1.0).cos() + 0.03 * (23.0 * d.z).sin()
-}
-
-/// Numbers that look random, the same on every run.
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f32 / (1 << 24) as f32
-    }
-
-    fn point(&mut self) -> Vec3 {
-        Vec3::new(self.next(), self.next(), self.next()) * 2.0 - 1.0
-    }
-
-    fn direction(&mut self) -> Vec3 {
-        let (z, a) = (2.0 * self.next() - 1.0, TAU * self.next());
-        let r = (1.0 - z * z).sqrt();
-        Vec3::new(r * a.cos(), r * a.sin(), z)
-    }
 }
 
 // ---- against brute force ----
@@ -468,64 +397,24 @@ fn rays_that_are_none_meet_nothing() {
 
 // ---- batches and builds ----
 
-/// Batches of all sorts: coherent and not, from one point and to one point, in all eight
-/// octants, with intervals that end before, at and behind the mesh.
-fn batches(numbers: &mut Numbers, points: &[Vec3]) -> Vec<Vec<Ray>> {
-    let mut batches = Vec::new();
-    for octant in (0..8).map(|s| Vec3::from([0, 1, 2].map(|axis| 1.0 - 2.0 * (s >> axis & 1) as f32))) {
-        let (eye, to) = (octant * Vec3::new(2.0, 3.0, 4.0), |p: Vec3| Vec3::new(p.y, p.z, p.x));
-        let pixel = |i: i32| Vec3::new((i % 32) as f32, (i / 32) as f32, 0.0) / 16.0 - 1.0;
-        batches.push((0..1024).map(|i| Ray::new(eye, octant * pixel(i) - eye)).collect());
-        batches.push(
-            (0..1024).map(|i| Ray::segment(eye, to(octant * pixel(i)) - eye, 0.3 + 0.1 * (i % 9) as f32)).collect(),
-        );
-        // From the surface to a light: origins differ, and some lie far apart.
-        batches.push(points.iter().take(1003).map(|&p| Ray::segment(p * 1.001, eye - p, 1.0)).collect());
-        batches.push((0..512).map(|i| Ray::new(eye + 0.5 * pixel(i), -eye)).collect());
-        // With lanes that ask nothing.
-        let end = |i: i32| if i % 5 == 1 { f32::NEG_INFINITY } else { 8.0 };
-        batches.push((0..519).map(|i| Ray::segment(eye, octant * pixel(i) - eye, end(i))).collect());
-    }
-    let mut scattered = || Ray::segment(numbers.point() * 2.0, numbers.direction(), 4.0 * numbers.next());
-    batches.push((0..1003).map(|_| scattered()).collect());
-    // Some that are none, among coherent ones.
-    let broken = |i: i32| if i % 37 == 5 { Vec3::ZERO } else { Vec3::new(1.0, 0.1, 0.01 * i as f32) };
-    batches.push((0..128).map(|i| Ray { d: broken(i), ..Ray::new(Vec3::ZERO, Vec3::X) }).collect());
-    batches.push((0..128).map(|i| Ray::new(Vec3::ZERO, Vec3::new(1.0, 0.0, 0.01 * i as f32))).collect());
-    batches
-}
-
 #[test]
 fn batches_answer_like_single_rays() {
     let (points, faces) = ball(30, |d| bumpy(d) + 0.2 * (31.0 * d.x).sin());
     let native = built(&[mesh(&points, faces)], Quality::Good);
     let nothing = built(&[], Quality::Good);
-    let batches = batches(&mut Numbers(21), &points);
-    let cases = batches.iter().flat_map(|b| [Coherence::Coherent, Coherence::Incoherent].map(|c| (b, c)));
-    for ((rays, coherence), native) in cases.flat_map(|c| [(c, &native), (c, &nothing)]) {
-        let (mut nearest, mut any) = (PacketBatch::<RayHitPacket>::default(), PacketBatch::<RayPacket>::default());
-        for ray in rays {
-            nearest.push(ray);
-            any.push(ray);
-        }
-        native.intersect_many(&mut nearest, coherence);
-        native.occluded_many(&mut any, coherence);
-        for (i, ray) in rays.iter().enumerate() {
-            let want = native.intersect(ray);
-            assert_eq!(nearest.packets()[i / 16].hit(i % 16), want, "ray {i}, {coherence:?}");
-            let occluded = any.packets()[i / 16].is_occluded(i % 16) && ray.t_far > 0.0;
-            assert_eq!(occluded, want.is_some(), "ray {i}, {coherence:?}");
-        }
+    for rays in batches(&mut Numbers(21), &points) {
+        check_batches(&native, &rays);
+        check_batches(&nothing, &rays);
     }
 }
 
 #[test]
 fn a_build_can_be_cancelled() {
     let (points, faces) = ball(60, bumpy);
-    let meshes = [mesh(&points, faces)];
+    let objects = objects(&[mesh(&points, faces)]);
     let cancel = AtomicBool::new(true);
     for quality in [Quality::Good, Quality::Fast] {
-        let result = Native::build(&meshes, &BuildOptions { quality, cancel: &cancel });
+        let result = Native::build(&objects, &BuildOptions { quality, cancel: &cancel });
         assert_eq!(result.err(), Some(BuildError::Cancelled));
     }
 }

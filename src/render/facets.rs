@@ -1,0 +1,314 @@
+//! Hits of triangles: from what a backend reports to points in f64.
+
+#![expect(clippy::needless_range_loop, reason = "an index runs over many arrays at once")]
+
+use super::block::{Block, F32, F64, Hits, Points, V, get, leave, put, wide};
+use super::paint::Palette;
+use crate::geom::{LANES, RayHitPacket};
+use crate::scene::{Instance, Mesh, Object, Scene};
+use crate::simd::{self, Kernel};
+use glam::{Vec2, Vec3};
+
+/// What hits of triangles are computed from.
+#[repr(align(64))]
+#[derive(Debug)]
+pub struct Facets {
+    o: [F32; 3],
+    d: [F32; 3],
+    reported: [F32; 2],
+    corners: [[F32; 3]; 3],
+    normals: [[F32; 3]; 3],
+    smooth: [bool; LANES],
+    /// Added to the size of the triangle where offsets are made: what the transform of an
+    /// instance rounds.
+    rounding: F32,
+    /// Weights of the corners, of the finished points.
+    weights: [F64; 3],
+    geom: [u32; LANES],
+    prim: [u32; LANES],
+}
+
+/// The mesh of object `geom`, and its placement if it is an instance.
+#[inline]
+fn mesh_of(scene: &Scene, geom: u32) -> (&Mesh, Option<&Instance>) {
+    match &scene.objects[geom as usize] {
+        Object::Mesh(mesh) => (mesh, None),
+        Object::Instance(instance) => (&instance.mesh, Some(instance)),
+        Object::Shapes(_) => unreachable!("hits of shapes are collected apart"),
+    }
+}
+
+/// Corners two and three change places where the placement mirrors space, so that the winding
+/// again tells the outside.
+#[inline]
+fn wound<T>(mesh: &Mesh, [a, b, c]: [T; 3]) -> [T; 3] {
+    if mesh.mirrored { [a, c, b] } else { [a, b, c] }
+}
+
+#[inline]
+fn set(to: &mut [F32; 3], lane: usize, v: Vec3) {
+    to[0][lane] = v.x;
+    to[1][lane] = v.y;
+    to[2][lane] = v.z;
+}
+
+impl Facets {
+    /// A good hit in every lane: lanes that no hit fills give numbers all the same, and a
+    /// packet with a NaN in it is slow to trace.
+    pub const EMPTY: Self = Self {
+        o: [[0.25; LANES], [0.25; LANES], [1.0; LANES]],
+        d: [[0.0; LANES], [0.0; LANES], [-1.0; LANES]],
+        reported: [[0.25; LANES]; 2],
+        corners: [
+            [[0.0; LANES]; 3],
+            [[1.0; LANES], [0.0; LANES], [0.0; LANES]],
+            [[0.0; LANES], [1.0; LANES], [0.0; LANES]],
+        ],
+        normals: [[[0.0; LANES]; 3]; 3],
+        smooth: [false; LANES],
+        rounding: [0.0; LANES],
+        weights: [[0.0; LANES]; 3],
+        geom: [0; LANES],
+        prim: [0; LANES],
+    };
+
+    /// Looks up what belongs to the hits of the first `len` lanes: first where everything
+    /// is, then everything, so that the memory has many questions to work on at a time.
+    fn gather(&mut self, scene: &Scene, block: &mut Block, palette: &Palette) {
+        let mut faces = [[0; 3]; LANES];
+        let mut normals = [None; LANES];
+        for lane in 0..block.len {
+            let (mesh, _) = mesh_of(scene, self.geom[lane]);
+            let (data, prim) = (&*mesh.data, self.prim[lane]);
+            faces[lane] = data.triangles.faces()[prim as usize];
+            block.material[lane] = mesh.material(prim);
+            normals[lane] = data.normals.as_ref().map(|n| n.of(data.triangles.faces(), prim as usize));
+        }
+        for lane in 0..block.len {
+            let (mesh, placed) = mesh_of(scene, self.geom[lane]);
+            let corners = faces[lane].map(|i| mesh.data.triangles.point(i));
+            let normals = normals[lane].and_then(|at| mesh.data.normals_at(at));
+            self.smooth[lane] = normals.is_some();
+            let normals = normals.unwrap_or_default();
+            let (corners, normals) = match placed {
+                None => (corners, normals),
+                Some(instance) => self.place(lane, instance, corners, normals),
+            };
+            for (to, p) in self.corners.iter_mut().zip(wound(mesh, corners)) {
+                set(to, lane, p);
+            }
+            for (to, n) in self.normals.iter_mut().zip(wound(mesh, normals)) {
+                set(to, lane, n);
+            }
+            if mesh.mirrored {
+                let [u, v] = &mut self.reported;
+                std::mem::swap(&mut u[lane], &mut v[lane]);
+            }
+            block.paint(lane, palette.get(block.material[lane]));
+        }
+    }
+
+    /// Corners and normals of an instance in scene space.
+    #[cold]
+    fn place(&mut self, lane: usize, i: &Instance, corners: [Vec3; 3], normals: [Vec3; 3]) -> ([Vec3; 3], [Vec3; 3]) {
+        let corners = corners.map(|p| i.to_scene.transform_point3(p.as_dvec3()).as_vec3());
+        self.rounding[lane] = i.rounding(corners[0]);
+        (corners, normals.map(|n| (i.normal_to_scene * n.as_dvec3()).normalize_or_zero().as_vec3()))
+    }
+
+    fn uv(&self, scene: &Scene, lane: usize) -> Option<Vec2> {
+        let (mesh, _) = mesh_of(scene, self.geom[lane]);
+        let corners = wound(mesh, mesh.data.uvs_of(self.prim[lane])?);
+        Some((0..3).map(|c| corners[c] * self.weights[c][lane] as f32).sum())
+    }
+}
+
+impl Hits for Facets {
+    #[inline]
+    fn set(&mut self, lane: usize, packet: &RayHitPacket, from: usize) {
+        let ray = &packet.ray;
+        for (to, of) in self.o.iter_mut().zip([&ray.o_x, &ray.o_y, &ray.o_z]) {
+            to[lane] = of[from];
+        }
+        for (to, of) in self.d.iter_mut().zip([&ray.d_x, &ray.d_y, &ray.d_z]) {
+            to[lane] = of[from];
+        }
+        self.reported[0][lane] = packet.hit.u[from];
+        self.reported[1][lane] = packet.hit.v[from];
+        self.rounding[lane] = 0.0;
+        self.geom[lane] = packet.hit.geom_id[from];
+        self.prim[lane] = packet.hit.prim_id[from];
+    }
+
+    fn finish(&mut self, len: usize, scene: &Scene, palette: &Palette, block: &mut Block) {
+        block.len = len;
+        self.gather(scene, block, palette);
+        simd::run(Finish { facets: self, block });
+        palette.add_texels(scene, block, |_, lane| self.uv(scene, lane));
+    }
+}
+
+struct Finish<'a> {
+    facets: &'a mut Facets,
+    block: &'a mut Block,
+}
+
+impl Kernel for Finish<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let mut points = Points::EMPTY;
+        refine(self.facets, &mut points);
+        shading_normals(self.facets, &mut points);
+        leave(&points, self.block);
+    }
+}
+
+#[inline(always)]
+fn dot(a: V, b: V) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+fn sub(a: V, b: V) -> V {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+fn scale(a: V, s: f64) -> V {
+    [a[0] * s, a[1] * s, a[2] * s]
+}
+
+#[inline(always)]
+fn cross(a: V, b: V) -> V {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// The steps of [`geom::triangle::refine`](crate::geom::triangle::refine) for all lanes, and the
+/// facet's normal turned to the ray.
+#[inline(always)]
+fn refine(f: &mut Facets, out: &mut Points) {
+    for i in 0..LANES {
+        let (o, d) = (wide(&f.o, i), wide(&f.d, i));
+        let p0 = wide(&f.corners[0], i);
+        let e1 = sub(wide(&f.corners[1], i), p0);
+        let e2 = sub(wide(&f.corners[2], i), p0);
+        let ng = cross(e1, e2);
+        let q = cross(sub(o, p0), d);
+        let along = dot(d, ng);
+        let inv = -1.0 / along;
+        let (u, v) = (dot(e2, q) * inv, -dot(e1, q) * inv);
+        // Seen exactly edge-on there is nothing better than what was reported.
+        let good = u.is_finite() & v.is_finite();
+        let u = if good { u } else { f64::from(f.reported[0][i]) };
+        let v = if good { v } else { f64::from(f.reported[1][i]) };
+        // The backend has decided that it is a hit: rounding never makes it a miss.
+        let (u, v) = (u.clamp(0.0, 1.0), v.clamp(0.0, 1.0));
+        let shrink = 1.0 / (u + v).max(1.0);
+        let (u, v) = (u * shrink, v * shrink);
+        let p = [0, 1, 2].map(|k| p0[k] + u * e1[k] + v * e2[k]);
+        let side = if along < 0.0 { 1.0 } else { -1.0 };
+        out.side[i] = side;
+        let unit = scale(ng, side / dot(ng, ng).sqrt());
+        put(&mut out.p, i, p);
+        put(&mut out.ng, i, unit);
+        f.weights[0][i] = 1.0 - u - v;
+        f.weights[1][i] = u;
+        f.weights[2][i] = v;
+        let e3 = sub(wide(&f.corners[2], i), wide(&f.corners[1], i));
+        let size = |e: V| e[0].abs() + e[1].abs() + e[2].abs();
+        out.extent[i] = size(e1).max(size(e2)).max(size(e3)) + f64::from(f.rounding[i]);
+        let d = [f.d[0][i], f.d[1][i], f.d[2][i]];
+        let back = -1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+        for k in 0..3 {
+            out.to_eye[k][i] = d[k] * back;
+        }
+    }
+}
+
+/// The shading normal from the corners where they have one, and the point from which the
+/// surface that those normals pretend would cast its shadows: the facet's own, lifted onto
+/// the corners' tangent planes where those lie outside.
+///
+/// Source of the lift: J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, ch. 4.
+#[inline(always)]
+fn shading_normals(f: &Facets, out: &mut Points) {
+    if !f.smooth.contains(&true) {
+        out.ns = out.ng;
+        out.lifted = out.p;
+        return;
+    }
+    for i in 0..LANES {
+        let (p, ng) = (get(&out.p, i), get(&out.ng, i));
+        let mut sum = [0.0; 3];
+        let mut lift = [0.0; 3];
+        for c in 0..3 {
+            let n = scale(wide(&f.normals[c], i), out.side[i]);
+            let weight = f.weights[c][i];
+            let below = dot(sub(p, wide(&f.corners[c], i)), n).min(0.0);
+            for k in 0..3 {
+                sum[k] += weight * n[k];
+                lift[k] += weight * below * n[k];
+            }
+        }
+        let length = dot(sum, sum).sqrt();
+        // Normals that cancel say nothing.
+        let usable = f.smooth[i] & (length > 1e-6);
+        let facing = dot(sum, ng) >= 0.0;
+        let inv = if facing { 1.0 / length } else { -1.0 / length };
+        let lifts = usable & facing;
+        for k in 0..3 {
+            out.ns[k][i] = if usable { sum[k] * inv } else { ng[k] };
+            out.lifted[k][i] = if lifts { p[k] - lift[k] } else { p[k] };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::{Ray, offset_origin, triangle};
+    use proptest::prelude::*;
+
+    fn vec(scale: f32) -> impl Strategy<Value = Vec3> {
+        [-1f32..1.0, -1f32..1.0, -1f32..1.0].prop_map(move |v| Vec3::from(v) * scale)
+    }
+
+    proptest! {
+        /// The lanes give the very numbers of the plain formulas.
+        #[test]
+        fn lanes_are_the_scalar_formulas(
+            corners in [vec(1.0), vec(1.0), vec(1.0)], inside in (0.01f32..0.5, 0.01f32..0.5), o in vec(5.0), far in 0.5f32..4.0,
+        ) {
+            let at = corners[0] + (corners[1] - corners[0]) * inside.0 + (corners[2] - corners[0]) * inside.1;
+            let ray = Ray::new(o, (at - o) * far);
+            prop_assume!((corners[1] - corners[0]).cross(corners[2] - corners[0]).length() > 1e-3);
+            let mut facets = Facets::EMPTY;
+            for lane in 0..LANES {
+                for k in 0..3 {
+                    facets.o[k][lane] = ray.o[k];
+                    facets.d[k][lane] = ray.d[k];
+                    for c in 0..3 {
+                        facets.corners[c][k][lane] = corners[c][k];
+                    }
+                }
+            }
+            let want = triangle::refine(ray.o, ray.d, corners, (0.3, 0.3));
+            let side = if want.ng.dot(ray.d.as_dvec3()) < 0.0 { 1.0 } else { -1.0 };
+            for level in simd::Level::ALL {
+                let mut block = Block::EMPTY;
+                simd::run_at(level, Finish { facets: &mut facets, block: &mut block });
+                for lane in [0, 7, 15] {
+                    prop_assert_eq!(Block::dvec3(&block.p, lane), want.p);
+                    prop_assert_eq!(block.extent[lane], want.extent);
+                    prop_assert_eq!(block.entering[lane], side > 0.0);
+                    let ng = Block::dvec3(&block.ng, lane);
+                    prop_assert!((ng - want.ng.normalize() * side).length() < 1e-15);
+                    prop_assert_eq!(block.ns, block.ng);
+                    prop_assert_eq!(Block::vec3(&block.front, lane), offset_origin(want.p, ng, want.extent));
+                }
+            }
+        }
+    }
+}
