@@ -1,7 +1,7 @@
 //! The backend: scenes of all kinds of objects, whose places are their ids.
 
 use crate::{blob, rays};
-use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
+use glam::{DAffine3, DQuat, DVec2, DVec3, Vec3};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 use tison::backend::embree::EmbreeBackend;
@@ -36,7 +36,7 @@ fn at(x: f64, y: f64) -> DAffine3 {
 }
 
 fn instance(data: &Arc<MeshData>, to_scene: DAffine3) -> Object {
-    Object::Instance(Instance { mesh: mesh(data), to_scene, normal_to_scene: DMat3::IDENTITY })
+    Object::Instance(Instance::new(mesh(data), to_scene))
 }
 
 fn shapes(set: AnyShapes) -> Object {
