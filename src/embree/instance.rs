@@ -2,7 +2,7 @@
 
 use super::scene::Geometry;
 use super::{Error, Scene, SceneBuilder};
-use crate::geom::{Hit, RayHitPacket};
+use crate::geom::{Hit, HitLanes, INVALID_ID, cofactors};
 use embree4_sys as sys;
 use glam::{Affine3A, DAffine3, DMat3, Mat3, Vec3};
 use std::sync::Arc;
@@ -36,9 +36,9 @@ impl SceneBuilder {
         let format = sys::RTCFormat::RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR;
         // SAFETY: the geometry is live; Embree copies the twelve floats.
         unsafe { sys::rtcSetGeometryTransform(geometry.raw(), 0, format, columns.as_ptr().cast()) };
-        self.contents.instances += 1;
+        self.contents.unsplit += 1;
         let id = self.attach(&geometry, "place a scene in another")?;
-        self.placed.set(id, cofactors(&matrix));
+        self.placed.set(id, cofactors(&matrix.matrix3.as_dmat3()).as_mat3());
         Ok(id)
     }
 }
@@ -55,16 +55,10 @@ fn in_f32(to_scene: &DAffine3) -> Option<Affine3A> {
     (honest && matrix.is_finite() && inverse.is_finite()).then_some(matrix)
 }
 
-/// What takes `e1 x e2` to the cross product of the moved edges.
-fn cofactors(matrix: &Affine3A) -> Mat3 {
-    let [x, y, z] = [matrix.matrix3.x_axis, matrix.matrix3.y_axis, matrix.matrix3.z_axis].map(Vec3::from);
-    Mat3::from_cols(y.cross(z), z.cross(x), x.cross(y))
-}
-
 /// The instances of a scene: how Embree's answers become ours.
 #[derive(Default)]
 pub(super) struct Placed {
-    /// What takes normals to the space of the scene, by `geom_id`; empty when the scene has no instance.
+    /// What takes `e1 x e2` to the cross product of the moved edges, by `geom_id`; empty when the scene has no instance.
     normals: Vec<Mat3>,
 }
 
@@ -90,12 +84,14 @@ impl Placed {
     }
 
     /// [`resolve`](Self::resolve) for each lane that hit.
-    #[inline(never)]
-    pub fn resolve_lanes<const N: usize>(&self, packet: &mut RayHitPacket<N>) {
+    pub fn resolve_lanes<const N: usize>(&self, hit: &mut HitLanes<N>) {
         for lane in 0..N {
-            let Some(hit) = packet.hit(lane) else { continue };
-            let hit = self.resolve(hit, packet.hit.inst_id[lane]);
-            packet.set_hit(lane, Some(&hit));
+            let instance = if hit.geom_id[lane] == INVALID_ID { INVALID_ID } else { hit.inst_id[lane] };
+            if let Some(normals) = self.normals.get(instance as usize) {
+                let ng = *normals * Vec3::new(hit.ng_x[lane], hit.ng_y[lane], hit.ng_z[lane]);
+                (hit.ng_x[lane], hit.ng_y[lane], hit.ng_z[lane]) = ng.into();
+                hit.geom_id[lane] = instance;
+            }
         }
     }
 }
@@ -103,7 +99,6 @@ impl Placed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::INVALID_ID;
     use glam::DVec3;
 
     #[test]
@@ -134,15 +129,6 @@ mod tests {
         for (name, to_scene, want) in cases {
             assert_eq!(in_f32(&to_scene).is_some(), want, "{name}");
         }
-    }
-
-    #[test]
-    fn normals_go_along_with_the_corners() {
-        let matrix = DMat3::from_cols(DVec3::new(1.0, 0.5, 0.0), DVec3::new(0.0, -2.0, 0.3), DVec3::new(0.2, 0.0, 3.0));
-        let matrix = DAffine3::from_mat3(matrix).as_affine3a();
-        let (e1, e2) = (Vec3::new(1.0, 2.0, 3.0), Vec3::new(-1.0, 0.5, 1.0));
-        let moved = matrix.transform_vector3(e1).cross(matrix.transform_vector3(e2));
-        assert!((cofactors(&matrix) * e1.cross(e2) - moved).length() < 1e-5 * moved.length());
     }
 
     #[test]

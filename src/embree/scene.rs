@@ -62,9 +62,10 @@ pub struct Scene {
 /// What a scene is made of.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Contents {
+    pub geometries: u32,
     pub meshes: u32,
-    pub shape_sets: u32,
-    pub instances: u32,
+    /// Shapes and instances, against which Embree never splits a packet.
+    pub unsplit: u64,
 }
 
 /// Fields are dropped in order: the C scene goes first, then what it points at, then the device.
@@ -149,6 +150,9 @@ impl SceneBuilder {
 
     /// Adds all shapes of `set` as one geometry and returns its `geom_id`; a hit's `prim_id` is the shape's number.
     ///
+    /// A hit's `t` is the set's answer rounded once; its `ng`, `u` and `v` are zero: who wants to know more asks the
+    /// set, once for the hit that counts.
+    ///
     /// # Errors
     /// [`Error::TooMany`] shapes, [`Error::OverBudget`], [`Error::OutOfMemory`], or [`Error::Call`].
     pub fn shapes<S: PrimSet>(&mut self, set: Arc<S>) -> Result<u32, Error> {
@@ -167,7 +171,7 @@ impl SceneBuilder {
         unsafe { sys::rtcSetGeometryIntersectFunction(geometry.raw(), Some(user::intersect::<S>)) };
         // SAFETY: as above. Without this one no shape would throw a shadow.
         unsafe { sys::rtcSetGeometryOccludedFunction(geometry.raw(), Some(user::occluded::<S>)) };
-        self.contents.shape_sets += 1;
+        self.contents.unsplit += u64::from(count);
         self.attach(&geometry, "add shapes")
     }
 
@@ -180,6 +184,7 @@ impl SceneBuilder {
         // SAFETY: scene and geometry are live; the scene takes a reference of its own.
         let id = unsafe { sys::rtcAttachGeometry(self.owner.raw.0.as_ptr(), geometry.raw()) };
         self.owner.device.check(doing)?;
+        self.contents.geometries += 1;
         Ok(id)
     }
 
@@ -231,6 +236,7 @@ impl Scene {
     ///
     /// # Panics
     /// As said; on every call once there was one.
+    #[inline]
     pub fn resume_panics(&self) {
         self.owner.fault.resume();
     }
@@ -242,8 +248,7 @@ impl Scene {
     }
 
     pub(super) fn is_one_mesh(&self) -> bool {
-        let Contents { meshes, shape_sets, instances } = self.contents;
-        (meshes, shape_sets, instances) == (1, 0, 0)
+        (self.contents.geometries, self.contents.meshes) == (1, 1)
     }
 
     #[inline]
@@ -254,13 +259,13 @@ impl Scene {
 
 impl fmt::Debug for SceneBuilder {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.debug_struct("SceneBuilder").field("geometries", &self.owner.keep.len()).finish_non_exhaustive()
+        f.debug_struct("SceneBuilder").field("geometries", &self.contents.geometries).finish_non_exhaustive()
     }
 }
 
 impl fmt::Debug for Scene {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.debug_struct("Scene").field("geometries", &self.owner.keep.len()).finish_non_exhaustive()
+        f.debug_struct("Scene").field("geometries", &self.contents.geometries).finish_non_exhaustive()
     }
 }
 

@@ -85,18 +85,15 @@ pub(super) unsafe extern "C" fn intersect<S: PrimSet>(args: *const sys::RTCInter
     let args = unsafe { &*args };
     // SAFETY: as in `bounds`.
     let set = unsafe { &*args.geometryUserPtr.cast::<UserSet<S>>() };
-    // SAFETY: Embree always passes a context.
-    let context = unsafe { &*args.context };
-    let ids = [args.primID, args.geomID, context.instID[0], context.instPrimID[0]];
     match args.N {
         // SAFETY: `valid` has `N` entries and `rayhit` the `N` rays and hits of the callback.
-        1 => unsafe { nearest::<S, 1>(set, args, ids) },
+        1 => unsafe { nearest::<S, 1>(set, args) },
         // SAFETY: as above.
-        4 => unsafe { nearest::<S, 4>(set, args, ids) },
+        4 => unsafe { nearest::<S, 4>(set, args) },
         // SAFETY: as above.
-        8 => unsafe { nearest::<S, 8>(set, args, ids) },
+        8 => unsafe { nearest::<S, 8>(set, args) },
         // SAFETY: as above.
-        16 => unsafe { nearest::<S, 16>(set, args, ids) },
+        16 => unsafe { nearest::<S, 16>(set, args) },
         n => set.fault.raise(unknown_width(n)),
     }
 }
@@ -126,37 +123,38 @@ fn unknown_width(n: u32) -> Box<dyn Any + Send> {
 }
 
 /// # Safety
-/// `valid` must have `N` entries, and `rayhit` the rays and hits of a packet of `N`, this call's alone.
+/// `valid` must have `N` entries, and `rayhit` the rays and hits of a packet of `N`.
 #[inline]
-unsafe fn nearest<S: PrimSet, const N: usize>(
-    set: &UserSet<S>,
-    args: &sys::RTCIntersectFunctionNArguments,
-    ids: [u32; 4],
-) {
-    // SAFETY: the caller's promise.
-    let packet = unsafe { Packet::<N>::new(args.valid, args.rayhit.cast()) };
-    set.fault.guard((), || run::<N, _>(Nearest { prims: &*set.prims, ids, packet }));
+unsafe fn nearest<S: PrimSet, const N: usize>(set: &UserSet<S>, args: &sys::RTCIntersectFunctionNArguments) {
+    // SAFETY: Embree always passes a context.
+    let context = unsafe { &*args.context };
+    let ids = [args.primID, args.geomID, context.instID[0], context.instPrimID[0]];
+    // SAFETY: the caller's promise; Embree leaves the packet to this call.
+    let packet = unsafe { Packet::<N, WITH_HITS>::new(args.valid, args.rayhit.cast()) };
+    set.fault.guard((), || run::<N>(Nearest { prims: &*set.prims, ids, packet }));
 }
 
 /// # Safety
-/// `valid` must have `N` entries, and `ray` the rays of a packet of `N`, this call's alone.
+/// `valid` must have `N` entries, and `ray` the rays of a packet of `N`.
 #[inline]
 unsafe fn any<S: PrimSet, const N: usize>(set: &UserSet<S>, args: &sys::RTCOccludedFunctionNArguments) {
-    // SAFETY: the caller's promise.
-    let packet = unsafe { Packet::<N>::new(args.valid, args.ray.cast()) };
-    set.fault.guard((), || run::<N, _>(AnyHit { prims: &*set.prims, prim: args.primID, packet }));
+    // SAFETY: the caller's promise; Embree leaves the packet to this call.
+    let packet = unsafe { Packet::<N, RAYS_ONLY>::new(args.valid, args.ray.cast()) };
+    set.fault.guard((), || run::<N>(InTheWay { prims: &*set.prims, prim: args.primID, packet }));
 }
 
 /// A single ray gains nothing from wide vectors.
 #[inline(always)]
-fn run<const N: usize, K: Kernel>(kernel: K) -> K::Output {
+fn run<const N: usize>(kernel: impl Kernel<Output = ()>) {
     if N == 1 { kernel.run() } else { simd::run(kernel) }
 }
 
+/// All of a callback is one kernel: handed out of it, the hits would go through memory.
 struct Nearest<'a, S, const N: usize> {
     prims: &'a S,
+    /// Of the primitive, the geometry, the instance, and the primitive of the instance.
     ids: [u32; 4],
-    packet: Packet<N>,
+    packet: Packet<N, WITH_HITS>,
 }
 
 impl<S: PrimSet, const N: usize> Kernel for Nearest<'_, S, N> {
@@ -166,64 +164,70 @@ impl<S: PrimSet, const N: usize> Kernel for Nearest<'_, S, N> {
     fn run(mut self) {
         let Some(t) = self.prims.hit_lanes(self.ids[0], &self.packet.rays()) else { return };
         let Some(found) = self.packet.found(&t) else { return };
-        self.packet.put(&found, T_FAR, |lane| (t[lane] as f32).to_bits());
+        self.packet.put(T_FAR, &found, |lane| (t[lane] as f32).to_bits());
         for field in SURFACE..IDS {
-            self.packet.put(&found, field, |_| 0);
+            self.packet.put(field, &found, |_| 0);
         }
-        for (field, id) in self.ids.into_iter().enumerate() {
-            self.packet.put(&found, IDS + field, |_| id);
+        for (i, id) in self.ids.into_iter().enumerate() {
+            self.packet.put(IDS + i, &found, |_| id);
         }
     }
 }
 
-struct AnyHit<'a, S, const N: usize> {
+struct InTheWay<'a, S, const N: usize> {
     prims: &'a S,
     prim: u32,
-    packet: Packet<N>,
+    packet: Packet<N, RAYS_ONLY>,
 }
 
-impl<S: PrimSet, const N: usize> Kernel for AnyHit<'_, S, N> {
+impl<S: PrimSet, const N: usize> Kernel for InTheWay<'_, S, N> {
     type Output = ();
 
     #[inline(always)]
     fn run(mut self) {
         let Some(t) = self.prims.hit_lanes(self.prim, &self.packet.rays()) else { return };
         let Some(found) = self.packet.found(&t) else { return };
-        self.packet.put(&found, T_FAR, |_| f32::NEG_INFINITY.to_bits());
+        self.packet.put(T_FAR, &found, |_| f32::NEG_INFINITY.to_bits());
     }
 }
 
-/// Embree's memory of the rays of one callback: word `i` of field `k` sits at `k * N + i`.
-struct Packet<const N: usize> {
-    valid: *const i32,
-    words: *mut u32,
-}
-
-/// Fields of a ray.
+/// Fields of a ray: origin, direction, and the interval.
 const ORIGIN: usize = 0;
 const T_NEAR: usize = 3;
 const DIRECTION: usize = 4;
 const T_FAR: usize = 8;
-/// Fields of a hit: normal, u and v; and the ids of primitive, geometry, instance and primitive of the instance.
+/// Fields of a hit, which follow those of the rays: normal, u and v, then the ids.
 const SURFACE: usize = 12;
 const IDS: usize = 17;
 
+/// Numbers of fields.
+const RAYS_ONLY: usize = SURFACE;
+const WITH_HITS: usize = IDS + 4;
+
 const _: () = {
-    use std::mem::offset_of;
-    use sys::{RTCRayHit, RTCRayHit16};
+    use std::mem::{offset_of, size_of};
+    use sys::{RTCRay, RTCRay16, RTCRayHit, RTCRayHit16};
     assert!(offset_of!(RTCRayHit, ray.org_x) == 4 * ORIGIN && offset_of!(RTCRayHit16, ray.org_x) == 64 * ORIGIN);
     assert!(offset_of!(RTCRayHit, ray.tnear) == 4 * T_NEAR && offset_of!(RTCRayHit16, ray.tnear) == 64 * T_NEAR);
     assert!(offset_of!(RTCRayHit, ray.dir_x) == 4 * DIRECTION && offset_of!(RTCRayHit16, ray.dir_x) == 64 * DIRECTION);
     assert!(offset_of!(RTCRayHit, ray.tfar) == 4 * T_FAR && offset_of!(RTCRayHit16, ray.tfar) == 64 * T_FAR);
     assert!(offset_of!(RTCRayHit, hit.Ng_x) == 4 * SURFACE && offset_of!(RTCRayHit16, hit.Ng_x) == 64 * SURFACE);
     assert!(offset_of!(RTCRayHit, hit.primID) == 4 * IDS && offset_of!(RTCRayHit16, hit.primID) == 64 * IDS);
-    assert!(offset_of!(RTCRayHit16, hit.instPrimID) == 64 * (IDS + 3));
+    assert!(offset_of!(RTCRayHit16, hit.instPrimID) == 64 * (WITH_HITS - 1));
+    assert!(size_of::<RTCRay>() == 4 * RAYS_ONLY && size_of::<RTCRay16>() == 64 * RAYS_ONLY);
 };
 
-impl<const N: usize> Packet<N> {
+/// Embree's memory of the rays of one callback, those of one packet or some of them in another order: `FIELDS` of
+/// `N` words, lane after lane.
+struct Packet<const N: usize, const FIELDS: usize> {
+    valid: *const i32,
+    words: *mut u32,
+}
+
+impl<const N: usize, const FIELDS: usize> Packet<N, FIELDS> {
     /// # Safety
-    /// While the packet is in use, `valid` must have `N` entries, and `words` the rays of a packet of `N`, with their
-    /// hits if hits are written; and nobody else uses them.
+    /// While the packet is in use, `valid` must be `N` numbers, and `words` `FIELDS * N` words that nobody else uses,
+    /// those of the rays initialised.
     #[inline(always)]
     unsafe fn new(valid: *const i32, words: *mut u32) -> Self {
         Self { valid, words }
@@ -231,10 +235,10 @@ impl<const N: usize> Packet<N> {
 
     #[inline(always)]
     fn floats(&self, field: usize) -> &[f32; N] {
-        debug_assert!(field <= T_FAR);
-        // SAFETY: a field of the rays; all bits are a float.
+        assert!(field < RAYS_ONLY && RAYS_ONLY <= FIELDS);
+        // SAFETY: the field is inside the packet.
         let first = unsafe { self.words.add(field * N) };
-        // SAFETY: as above; writing takes `&mut self`.
+        // SAFETY: as above, and initialised: any word is a float. Writing takes `&mut self`.
         unsafe { &*first.cast() }
     }
 
@@ -244,7 +248,7 @@ impl<const N: usize> Packet<N> {
         Lanes { o: axes(ORIGIN), d: axes(DIRECTION), t_near: self.floats(T_NEAR), t_far: self.floats(T_FAR) }
     }
 
-    /// The active lanes that `t` is below infinity in, if there are any. A NaN is none.
+    /// The active lanes in which `t` is below infinity, if there are any. A NaN is not.
     #[inline(always)]
     fn found(&self, t: &[f64; N]) -> Option<[bool; N]> {
         // SAFETY: the promise of `new`.
@@ -258,13 +262,14 @@ impl<const N: usize> Packet<N> {
         any.then_some(found)
     }
 
-    /// Writes `word` to the lanes that `found` something; others keep what they have, be it uninitialised. That is a
-    /// blend, which becomes vector code; a branch per lane does not.
+    /// Puts `word` into the lanes that `found` something. The others get what they have, be it uninitialised: such a
+    /// blend of whole fields is a few vector instructions, where a branch per lane cost a fifth of the callback.
     #[inline(always)]
-    fn put(&mut self, found: &[bool; N], field: usize, word: impl Fn(usize) -> u32) {
-        // SAFETY: a field of the packet.
+    fn put(&mut self, field: usize, found: &[bool; N], word: impl Fn(usize) -> u32) {
+        assert!(field < FIELDS);
+        // SAFETY: the field is inside the packet.
         let first = unsafe { self.words.add(field * N) };
-        // SAFETY: as above, this call's alone.
+        // SAFETY: as above, and nobody else uses it.
         let lanes = unsafe { &mut *first.cast::<[MaybeUninit<u32>; N]>() };
         let (old, new): ([_; N], [_; N]) = (*lanes, std::array::from_fn(word));
         for lane in 0..N {

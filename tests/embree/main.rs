@@ -2,6 +2,7 @@
 //! written in Rust. Clean under valgrind, which sees what Rust cannot: what the C library reads and writes.
 #![cfg(feature = "embree")]
 
+mod backend;
 mod instances;
 mod lifecycle;
 mod rays;

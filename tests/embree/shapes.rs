@@ -15,12 +15,12 @@ fn scene<S: ShapeSet + 'static>(device: &Device, set: Arc<S>, quality: Quality) 
     builder.commit(None).unwrap()
 }
 
-const COUNT: usize = 60;
+const COUNT: u32 = 60;
 
-fn plain<S: Shape>(make: impl Fn(DVec3, f64) -> S) -> Plain<S> {
+fn plain<S: Shape>(count: u32, make: impl Fn(DVec3, f64) -> S) -> Plain<S> {
     let mut numbers = Numbers(11);
     let mut set = Plain::default();
-    for _ in 0..COUNT {
+    for _ in 0..count {
         set.push(make(numbers.point().as_dvec3(), 0.05 + 0.3 * f64::from(numbers.next())));
     }
     set
@@ -30,7 +30,7 @@ fn plain<S: Shape>(make: impl Fn(DVec3, f64) -> S) -> Plain<S> {
 fn placed<S: Shape>(shape: S) -> Affine<S> {
     let mut numbers = Numbers(12);
     let mut set = Affine::default();
-    while ShapeSet::len(&set) < COUNT as u32 {
+    while ShapeSet::len(&set) < COUNT {
         let [x, y, z] = std::array::from_fn(|_| 0.3 * numbers.point().as_dvec3());
         let _ = set.push(shape, DAffine3::from_mat3_translation(DMat3::from_cols(x, y, z), numbers.point().as_dvec3()));
     }
@@ -113,12 +113,18 @@ fn check<S: ShapeSet + 'static>(what: &str, set: S) {
 
 #[test]
 fn spheres_answer_as_a_loop_over_all_of_them() {
-    check("spheres", plain(|c, r| Sphere::new(c, r).unwrap()));
+    check("spheres", plain(COUNT, |c, r| Sphere::new(c, r).unwrap()));
+}
+
+/// So many that incoherent packets go ray by ray.
+#[test]
+fn a_crowd_of_spheres_answers_as_a_loop_over_all_of_them() {
+    check("a crowd", plain(1000, |c, r| Sphere::new(c, 0.2 * r).unwrap()));
 }
 
 #[test]
 fn cubes_answer_as_a_loop_over_all_of_them() {
-    check("cubes", plain(|c, r| Cube::new(c, DVec3::new(r, 0.5 * r, 0.8 * r)).unwrap()));
+    check("cubes", plain(COUNT, |c, r| Cube::new(c, DVec3::new(r, 0.5 * r, 0.8 * r)).unwrap()));
 }
 
 #[test]
@@ -145,7 +151,7 @@ fn quads_answer_as_a_loop_over_all_of_them() {
 /// Packets as cameras make them: most lanes meet the same shape.
 #[test]
 fn coherent_packets_answer_as_a_loop_over_all_of_them() {
-    let set = Arc::new(plain(|c, r| Sphere::new(c, r).unwrap()));
+    let set = Arc::new(plain(COUNT, |c, r| Sphere::new(c, r).unwrap()));
     let scene = scene(&device(), set.clone(), Quality::Medium);
     let mut hits = 0;
     for block in 0..400 {
