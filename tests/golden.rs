@@ -208,7 +208,7 @@ fn everything_beside_the_scenes_is_used() {
 fn large_scenes_load_and_render() {
     for file in LARGE {
         let mut loaded = load(file);
-        let camera = loaded.cameras.first().map(|c| c.camera.clone()).unwrap_or_else(|| {
+        let camera = loaded.cameras.first().map(|c| c.camera).unwrap_or_else(|| {
             let camera = loaded.scene.auto_camera(View::ThreeQuarter, &CameraOverrides::default(), 1.5);
             let camera = camera.expect("there is something to see");
             loaded.scene.light_from(&camera);
