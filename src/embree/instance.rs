@@ -104,10 +104,9 @@ mod tests {
     #[test]
     fn transforms_that_f32_can_undo_and_others() {
         let scaled = |x: f64, y: f64, z: f64| DAffine3::from_scale(DVec3::new(x, y, z));
-        let leaning = |by: f64| {
-            DAffine3::from_mat3(DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::new(1.0, 0.0, by)))
-                * DAffine3::from_rotation_z(0.3)
-        };
+        let turn = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 1.0);
+        let leaning =
+            |by: f64| DAffine3::from_mat3(turn * DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::new(1.0, 0.0, by)));
         let far = |x: f64| DAffine3::from_translation(DVec3::new(x, 0.0, 0.0));
         let cases = [
             ("nothing", DAffine3::IDENTITY, true),
