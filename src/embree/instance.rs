@@ -104,9 +104,8 @@ mod tests {
     #[test]
     fn transforms_that_f32_can_undo_and_others() {
         let scaled = |x: f64, y: f64, z: f64| DAffine3::from_scale(DVec3::new(x, y, z));
-        let turn = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 1.0);
-        let leaning =
-            |by: f64| DAffine3::from_mat3(turn * DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::new(1.0, 0.0, by)));
+        let turn = DAffine3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.8);
+        let leaning = |by: f64| turn * DAffine3::from_scale(DVec3::new(1.0, 1.0, by)) * turn.inverse();
         let far = |x: f64| DAffine3::from_translation(DVec3::new(x, 0.0, 0.0));
         let cases = [
             ("nothing", DAffine3::IDENTITY, true),
