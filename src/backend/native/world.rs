@@ -4,6 +4,7 @@ use super::build::{Source, build, numbers, owner};
 use super::bvh::{Apart, Bvh, Child};
 use super::packet::{Tools, bits};
 use super::placed::Placed;
+use super::ray::Line;
 use super::traverse::{Best, SMALL_STACK, STACK, Slot, Space, Waiting, Walk};
 use super::{BuildError, BuildOptions};
 use crate::geom::triangle::TriangleHit;
@@ -121,18 +122,16 @@ impl Space for World {
     fn apart<const ANY: bool>(&self, walk: &mut Walk, index: usize, stack: &mut [Waiting]) -> bool {
         let Apart { object, prim } = self.bvh.apart[index];
         let id = self.first[object as usize] + prim;
-        let (o, d) = walk.ray();
         match &self.things[object as usize] {
             Thing::Mesh => false,
             Thing::Shapes(set) => {
-                let (t_near, t_far) = walk.interval();
+                let Line { o, d, t_near, t_far } = walk.line;
                 let t = with_shapes!(set, set => set.hit(prim, o, d, t_near, t_far));
                 t.is_some_and(|t| walk.offer(shape_hit(t, id)))
             }
             Thing::Placed(placed) => {
                 let mesh = &self.meshes[placed.mesh as usize];
-                let (o, d) = placed.local_ray(o, d);
-                let Some(mut local) = walk.placed(o, d) else { return false };
+                let Some(mut local) = placed.local(walk) else { return false };
                 local.descend::<ANY, Bvh>(mesh, Child::ROOT, stack);
                 local.best().is_some_and(|&best| walk.offer(Best { id, ..best }))
             }
@@ -165,10 +164,7 @@ impl Space for World {
             Thing::Placed(placed) => {
                 let mesh = &self.meshes[placed.mesh as usize];
                 let local = |lane: usize| {
-                    let walk = walks[lane].as_ref().filter(|_| lanes >> lane & 1 == 1)?;
-                    let (o, d) = walk.ray();
-                    let (o, d) = placed.local_ray(o, d);
-                    walk.placed(o, d)
+                    walks[lane].as_ref().filter(|_| lanes >> lane & 1 == 1).and_then(|walk| placed.local(walk))
                 };
                 tools.placed.walks.clear();
                 tools.placed.walks.extend((0..walks.len()).map(local));
