@@ -41,8 +41,6 @@ impl Placed {
 impl Space for Bvh {
     const PLACED: bool = true;
 
-    type Tools = ();
-
     #[inline]
     fn bvh(&self) -> &Bvh {
         self
@@ -52,17 +50,5 @@ impl Space for Bvh {
     #[inline]
     fn apart<const ANY: bool>(&self, _: &mut Walk, _: usize, _: &mut [Waiting]) -> bool {
         false
-    }
-
-    #[inline]
-    fn apart_together<const ANY: bool>(
-        &self,
-        _: usize,
-        _: u32,
-        _: &mut [Option<Walk>],
-        _: &mut [Waiting],
-        (): &mut (),
-    ) -> u32 {
-        0
     }
 }

@@ -20,24 +20,11 @@ pub(super) trait Space {
     /// Whether rays come from another space, so that their origins are rounded to f32.
     const PLACED: bool;
 
-    /// What packets need to test things that have leaves to themselves.
-    type Tools;
-
     fn bvh(&self) -> &Bvh;
 
     /// Tests `apart[index]` of the hierarchy; whether it is the best hit now. `stack` is free
     /// to use.
     fn apart<const ANY: bool>(&self, walk: &mut Walk, index: usize, stack: &mut [Waiting]) -> bool;
-
-    /// The same for the rays of `lanes`: bits of those for which it is the best hit now.
-    fn apart_together<const ANY: bool>(
-        &self,
-        index: usize,
-        lanes: u32,
-        walks: &mut [Option<Walk>],
-        stack: &mut [Waiting],
-        tools: &mut Self::Tools,
-    ) -> u32;
 }
 
 /// The best hit so far.
