@@ -34,9 +34,9 @@ impl Item {
 
     /// Something with a leaf to itself. Beyond 1e37 nothing is sure to be hit.
     pub(super) fn apart(bounds: &Bounds, id: u32) -> Self {
-        // `max` and `min` pass over a NaN: a side that is none is far away.
-        let lo = bounds.lo.map(|x| x.max(-FARTHEST).min(FARTHEST)).as_vec3();
-        let hi = bounds.hi.map(|x| x.min(FARTHEST).max(-FARTHEST)).as_vec3();
+        let side = |x: f64, far: f64| if x.is_nan() { far } else { x.clamp(-FARTHEST, FARTHEST) };
+        let lo = bounds.lo.map(|x| side(x, -FARTHEST)).as_vec3();
+        let hi = bounds.hi.map(|x| side(x, FARTHEST)).as_vec3();
         Self { lo_id: lo.map(f32::next_down).extend(f32::from_bits(id)), hi: hi.map(f32::next_up).extend(APART) }
     }
 

@@ -85,8 +85,8 @@ impl World {
         const NONE: Waiting = (0.0, Child::NONE);
         match self.stack_len {
             0 => false,
-            1..=SMALL_STACK => walk.descend::<ANY, Self>(self, Child::ROOT, &mut [NONE; SMALL_STACK]),
-            ..=STACK => walk.descend::<ANY, Self>(self, Child::ROOT, &mut [NONE; STACK]),
+            len if len <= SMALL_STACK => walk.descend::<ANY, Self>(self, Child::ROOT, &mut [NONE; SMALL_STACK]),
+            len if len <= STACK => walk.descend::<ANY, Self>(self, Child::ROOT, &mut [NONE; STACK]),
             _ => walk.descend::<ANY, Self>(self, Child::ROOT, &mut [NONE; 2 * STACK]),
         }
     }
