@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use tempfile::TempDir;
 use tison::scene::Error;
-use tison::scene::obj::{MtlMaterial, ObjFile, ReadOptions, read};
+use tison::scene::obj::{MtlMaterial, ObjFile, ReadOptions, Uv, read};
 
 static GO_ON: AtomicBool = AtomicBool::new(false);
 
 fn options(allow: &[PathBuf]) -> ReadOptions<'_> {
-    ReadOptions { normals: true, uv: true, allow, cancel: &GO_ON, progress: None }
+    ReadOptions { normals: true, uv: Uv::Always, materials: true, allow, cancel: &GO_ON, progress: None }
 }
 
 fn load(path: &Path) -> Result<ObjFile, Error> {
@@ -133,6 +133,29 @@ fn libraries_outside_the_folder_need_permission() {
         std::fs::write(&path, text.replace("../lib", "link")).expect("a file can be written");
         assert!(matches!(load(&path), Err(Error::Forbidden { .. })));
     }
+}
+
+#[test]
+fn texture_coordinates_are_kept_where_an_image_in_use_needs_them() {
+    let mtl = "newmtl plain\nmap_Kd none.png\nnewmtl wood\nmap_Kd C:\\tex\\wood.png\nnewmtl spare\nmap_Kd spare.png\n";
+    let dir = folder(&[("a.mtl", mtl), ("wood.png", "")]);
+    let path = dir.path().join("a.obj");
+    let read_as = |material: &str, uv, materials| {
+        let faces = TRIANGLE.replace("f 1 2 3", "f 1/1 2/1 3/1");
+        std::fs::write(&path, format!("mtllib a.mtl\nusemtl {material}\nvt 0 0\n{faces}")).expect("it can be written");
+        read(&path, &ReadOptions { uv, materials, ..options(&[]) }).expect("the text is fine")
+    };
+    let wood = read_as("wood", Uv::IfTextured, true);
+    assert!(wood.uvs.is_some());
+    assert_eq!(wood.materials[0].map_kd, Some(dir.path().canonicalize().expect("it is there").join("wood.png")));
+    assert_eq!((wood.counts.unused_materials, wood.counts.unused_images), (2, 2));
+    // An image that is not there needs none.
+    let plain = read_as("plain", Uv::IfTextured, true);
+    assert!(plain.uvs.is_none() && plain.materials[0].map_kd.is_none());
+    assert_eq!(told(&dir, &plain), ["a.mtl:2: image 'none.png' is not there: Kd is used alone"]);
+    let bare = read_as("wood", Uv::IfTextured, false);
+    assert!(bare.uvs.is_none() && bare.materials.is_empty() && bare.face_materials.is_none());
+    assert!(read_as("wood", Uv::Always, false).uvs.is_some() && read_as("wood", Uv::Never, true).uvs.is_none());
 }
 
 /// Position, normal and texture coordinates of every corner, as tobj has them.

@@ -2,8 +2,10 @@
 
 use super::{Backend, BuildOptions, Error};
 use crate::embree::{self, Device, DeviceConfig, Quality, SceneBuilder, SceneOptions};
-use crate::geom::{Coherence, Hit, PacketBatch, Ray, RayHitPacket, RayPacket};
-use crate::scene::Scene;
+use crate::geom::{Coherence, Hit, PacketBatch, Ray, RayHitPacket, RayPacket, TriangleMesh};
+use crate::scene::{Object, Scene};
+use crate::with_shapes;
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -16,24 +18,17 @@ pub struct EmbreeBackend {
 }
 
 impl EmbreeBackend {
-    /// Builds it: one geometry per object, buffers shared with the scene, ROBUST.
+    /// Builds it: one geometry per object, buffers shared with the scene, ROBUST. A mesh that is placed many times
+    /// gets one hierarchy of its own, which its instances share.
     ///
     /// # Errors
     /// See [`Error`].
     pub fn build(scene: &Scene, options: &BuildOptions<'_>) -> Result<Self, Error> {
         let device = Device::new(&DeviceConfig { threads: options.threads, ..DeviceConfig::default() })?;
         let quality = if options.prefers_quick_build(scene) { Quality::Low } else { Quality::Medium };
-        let mut builder = SceneBuilder::new(&device, SceneOptions { quality, ..SceneOptions::default() })?;
-        for mesh in scene.objects.iter().filter_map(|o| o.mesh()) {
-            builder.mesh(Arc::clone(&mesh.data.triangles))?;
-        }
-        let progress = |share: f64| {
-            if let Some(tell) = options.progress {
-                tell(share);
-            }
-            !options.cancel.load(Relaxed)
-        };
-        let scene = builder.commit(Some(&progress))?;
+        let mut build =
+            Build { device: &device, quality, options, done: 0, total: total(scene), placed: HashMap::new() };
+        let scene = build.scene(scene)?;
         Ok(Self { scene, device, quality })
     }
 
@@ -56,6 +51,69 @@ impl EmbreeBackend {
     }
 }
 
+/// A build under way.
+struct Build<'a> {
+    device: &'a Device,
+    quality: Quality,
+    options: &'a BuildOptions<'a>,
+    /// Primitives in the hierarchies that are finished.
+    done: usize,
+    /// Primitives in all of them.
+    total: usize,
+    /// The hierarchies of meshes that have instances.
+    placed: HashMap<*const TriangleMesh, Arc<embree::Scene>>,
+}
+
+impl Build<'_> {
+    /// Ids count up as geometries are added: an object's is its index.
+    fn scene(&mut self, scene: &Scene) -> Result<embree::Scene, Error> {
+        let mut builder = self.builder()?;
+        for object in &scene.objects {
+            match object {
+                Object::Mesh(mesh) => builder.mesh(Arc::clone(&mesh.data.triangles)),
+                Object::Shapes(shapes) => with_shapes!(&shapes.set, set => builder.shapes(Arc::clone(set))),
+                Object::Instance(i) => builder.instance(self.placed(&i.mesh.data.triangles)?, &i.to_scene),
+            }?;
+        }
+        self.commit(builder, self.total - self.done)
+    }
+
+    /// The hierarchy of a mesh in its own space.
+    fn placed(&mut self, mesh: &Arc<TriangleMesh>) -> Result<Arc<embree::Scene>, Error> {
+        if let Some(built) = self.placed.get(&Arc::as_ptr(mesh)) {
+            return Ok(Arc::clone(built));
+        }
+        let mut builder = self.builder()?;
+        builder.mesh(Arc::clone(mesh))?;
+        let built = Arc::new(self.commit(builder, mesh.face_count())?);
+        self.placed.insert(Arc::as_ptr(mesh), Arc::clone(&built));
+        Ok(built)
+    }
+
+    fn builder(&self) -> Result<SceneBuilder, Error> {
+        let options = SceneOptions { quality: self.quality, ..SceneOptions::default() };
+        Ok(SceneBuilder::new(self.device, options)?)
+    }
+
+    /// Builds a hierarchy over `primitives`.
+    fn commit(&mut self, builder: SceneBuilder, primitives: usize) -> Result<embree::Scene, Error> {
+        let progress = |share: f64| {
+            if let Some(tell) = self.options.progress {
+                tell((self.done as f64 + share * primitives as f64) / self.total as f64);
+            }
+            !self.options.cancel.load(Relaxed)
+        };
+        let built = builder.commit(Some(&progress))?;
+        self.done += primitives;
+        Ok(built)
+    }
+}
+
+/// Primitives in all hierarchies of `scene`, and never none.
+fn total(scene: &Scene) -> usize {
+    scene.stored_triangles() + scene.shapes() + scene.objects.len()
+}
+
 impl From<embree::Error> for Error {
     fn from(e: embree::Error) -> Self {
         match e {
@@ -65,24 +123,31 @@ impl From<embree::Error> for Error {
     }
 }
 
+/// A shape that panicked is missed by every later ray: no answer leaves here before it was asked whether one did.
 impl Backend for EmbreeBackend {
     #[inline]
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.scene.intersect(ray)
+        let hit = self.scene.intersect(ray);
+        self.scene.resume_panics();
+        hit
     }
 
     #[inline]
     fn occluded(&self, ray: &Ray) -> bool {
-        self.scene.occluded(ray)
+        let occluded = self.scene.occluded(ray);
+        self.scene.resume_panics();
+        occluded
     }
 
     #[inline]
     fn intersect_many(&self, rays: &mut PacketBatch<RayHitPacket>, coherence: Coherence) {
         self.scene.intersect_batch(rays, coherence);
+        self.scene.resume_panics();
     }
 
     #[inline]
     fn occluded_many(&self, rays: &mut PacketBatch<RayPacket>, coherence: Coherence) {
         self.scene.occluded_batch(rays, coherence);
+        self.scene.resume_panics();
     }
 }

@@ -56,7 +56,7 @@ pub fn check(args: &CheckArgs, messages: &Messages) -> Result<Exit, Failure> {
 }
 
 fn load(file: &Path, reading: &ReadingArgs) -> Result<Loaded, Failure> {
-    Input::of(file).check_defines(&reading.define, file)?;
+    Input::of(file).check_reading(reading, file)?;
     let control = Arc::new(Control::default());
     let signals =
         Signals::install(&control).map_err(|e| Failure::new(Exit::Internal, "cannot listen for signals").because(e))?;

@@ -1,7 +1,7 @@
 //! What a run will do: the flags, checked together. All that can be refused without
 //! reading the scene is refused here; what the scene file may say is settled by `settings`.
 
-use super::args::{CameraArgs, PictureArgs, ProgressMode, RenderArgs};
+use super::args::{CameraArgs, PictureArgs, ProgressMode, ReadingArgs, RenderArgs};
 use super::exit::Failure;
 use super::frame::Frame;
 use super::settings::{SIZE, Setting, Settings};
@@ -71,22 +71,27 @@ impl Input {
         if format::Format::of(path).is_some() { Self::Scene } else { Self::Mesh }
     }
 
-    /// Refuses to set keys of a mesh.
-    pub fn check_defines(self, defines: &[String], path: &Path) -> Result<(), Failure> {
-        if self == Self::Mesh && !defines.is_empty() {
+    /// Refuses to set keys of a mesh, and to allow what is no folder.
+    pub fn check_reading(self, reading: &ReadingArgs, path: &Path) -> Result<(), Failure> {
+        if self == Self::Mesh && !reading.define.is_empty() {
             let what = format!("-D sets keys of a scene file, and {} is none", path.display());
             return Err(Failure::usage(what).help("use the flags of tison render --help for a mesh"));
         }
-        Ok(())
+        match reading.allow_path.iter().find(|dir| !dir.is_dir()) {
+            Some(dir) => Err(Failure::usage(format!("--allow-path {}: there is no such folder", dir.display()))),
+            None => Ok(()),
+        }
     }
 }
+
+const ANOTHER_NAME: &str = "name another file with -o, or with --stats";
 
 impl Plan {
     /// Checks the flags together.
     pub fn new(args: &RenderArgs) -> Result<Self, Failure> {
         let input = args.input.clone().ok_or_else(|| Failure::usage("no file to render was given"))?;
         let kind = Input::of(&input);
-        kind.check_defines(&args.reading.define, &input)?;
+        kind.check_reading(&args.reading, &input)?;
         let outputs = outputs(args, &input)?;
         let stats = args.stats.clone().map(Target::of);
         if stats == Some(Target::Stdout) && outputs.iter().any(|o| o.target == Target::Stdout) {
@@ -162,13 +167,25 @@ impl Plan {
         Ok(())
     }
 
+    /// What was read for the scene stays as it is too.
+    pub fn check_read(&self, read: &[PathBuf]) -> Result<(), Failure> {
+        let written = self.files();
+        match written.iter().find(|file| read.iter().any(|r| same_file(file, r))) {
+            Some(file) => {
+                let what = format!("{} is read for the scene: it would be overwritten", file.display());
+                Err(Failure::usage(what).help(ANOTHER_NAME))
+            }
+            None => Ok(()),
+        }
+    }
+
     /// The input stays as it is, and no file is written twice.
     fn refuse_overwriting(&self) -> Result<(), Failure> {
         let files = self.files();
         for (i, file) in files.iter().enumerate() {
             if same_file(file, &self.input) {
                 let what = format!("{} is the input: it would be overwritten", file.display());
-                return Err(Failure::usage(what).help("name another file with -o"));
+                return Err(Failure::usage(what).help(ANOTHER_NAME));
             }
             if files[..i].iter().any(|f| f == file || (same_file(f, file) && !film::is_special_file(f))) {
                 return Err(Failure::usage(format!("{} would be written twice", file.display())));

@@ -103,6 +103,7 @@ impl Run<'_> {
         let mut ready = timed(&mut done.seconds.read, || self.read())?;
         let frame = Frame { size: ready.settings.job.size, crop: ready.settings.job.crop, pixel: None };
         limits::check(&frame, &self.plan.aovs)?;
+        self.plan.check_read(&ready.loaded.files)?;
         done.warnings = ready.warnings;
         done.seconds.textures = ready.loaded.texture_seconds.min(done.seconds.read);
         done.seconds.read -= done.seconds.textures;

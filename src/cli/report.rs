@@ -10,7 +10,7 @@ use super::target::Target;
 use super::{output, stats, system};
 use tison::backend::AnyBackend;
 use tison::film;
-use tison::scene::{CameraDesc, Projection, SceneCounts};
+use tison::scene::{CameraDesc, Projection, SceneCounts, Unused};
 
 /// The story of a run.
 #[derive(Debug)]
@@ -20,6 +20,7 @@ pub struct Report<'a> {
     pub counts: SceneCounts,
     /// Name of what a scene may need, and whether this one does.
     pub needs: Vec<(&'static str, bool)>,
+    pub unused: Unused,
     pub scene_bytes: u64,
     pub backend_bytes: u64,
     /// Release, packet width, build quality.
@@ -39,6 +40,7 @@ impl<'a> Report<'a> {
             settings: &ready.settings,
             counts: scene.counts(),
             needs: scene.needs().list().to_vec(),
+            unused: ready.loaded.unused,
             scene_bytes: scene.bytes() as u64,
             backend_bytes: backend.bytes(),
             details: backend.details(),
@@ -195,7 +197,7 @@ impl<'a> Report<'a> {
             .map(|(name, why)| {
                 let name = name.replace('_', " ");
                 match why {
-                    stats::Skipped::Count(n) => format!("{} {name}", grouped(n)),
+                    stats::Skipped::Count(n) => format!("{name}: {}", grouped(n)),
                     stats::Skipped::Because(why) => format!("{name} ({why})"),
                 }
             })

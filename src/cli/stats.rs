@@ -30,7 +30,11 @@ pub fn skipped(report: &Report<'_>) -> Vec<(&'static str, Skipped)> {
         };
         (name, Skipped::Because(why))
     });
+    let unused = &report.unused;
     let counts = [
+        ("unused_materials", unused.materials as u64),
+        ("unused_textures", unused.textures as u64),
+        ("lights_without_power", unused.lights as u64),
         ("shadow_rays_facing_away", report.done.stats.shadow_rays_facing_away),
         ("branches_below_cut", report.done.stats.branches_below_cut),
     ];

@@ -116,6 +116,11 @@ impl Device {
         self.0.memory.peak.load(Relaxed).max(0) as u64
     }
 
+    /// Whether both are clones of one.
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+
     pub(super) fn raw(&self) -> sys::RTCDevice {
         self.0.raw.as_ptr()
     }

@@ -51,6 +51,18 @@ pub enum Error {
         /// How many there are.
         count: usize,
     },
+    /// A transform that single precision cannot undo.
+    #[error(
+        "the transform of an instance cannot be undone in single precision, in which Embree works: give every axis \
+         a direction of its own and a scale between 1e-12 and 1e12"
+    )]
+    Transform,
+    /// What was to be placed is not a scene of one mesh.
+    #[error("a scene that is placed in another must hold one mesh and nothing else")]
+    NotOneMesh,
+    /// What was to be placed belongs to another device.
+    #[error("a scene can only be placed in another of the same device: build both on one")]
+    OtherDevice,
     /// Embree refused a call.
     #[error("Embree could not {doing}: {code}{}{message}", if message.is_empty() { "" } else { ": " })]
     Call {

@@ -47,10 +47,15 @@ impl Fault {
     }
 
     /// Raises the panic again, if there was one.
+    #[inline]
     pub fn resume(&self) {
-        if !self.raised.load(Ordering::Acquire) {
-            return;
+        if self.raised.load(Ordering::Acquire) {
+            self.resume_first();
         }
+    }
+
+    #[cold]
+    fn resume_first(&self) {
         let payload = self.payload.lock().unwrap_or_else(PoisonError::into_inner).take();
         match payload {
             Some(payload) => resume_unwind(payload),

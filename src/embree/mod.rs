@@ -8,6 +8,7 @@
 //! | `packet` | the C call for each packet width, and the proof that our packets are C's |
 //! | `rescale` | directions of a length at which Embree would lose hits |
 //! | `user` | [`PrimSet`]: shapes that Embree calls back for |
+//! | `instance` | scenes placed in others |
 //! | `fault` | panics in those callbacks, kept until Rust code can raise them again |
 //!
 //! It knows `geom` and the crate `embree4-sys`; nothing of the latter leaves this room. What must not happen at the
@@ -33,6 +34,7 @@
 mod device;
 mod error;
 mod fault;
+mod instance;
 mod packet;
 mod query;
 mod rescale;
@@ -43,4 +45,4 @@ pub use device::{Device, DeviceConfig};
 pub use error::Error;
 pub use packet::Width;
 pub use scene::{Quality, Scene, SceneBuilder, SceneOptions};
-pub use user::{PrimHit, PrimHits, PrimSet, RayLanes};
+pub use user::PrimSet;

@@ -1,6 +1,7 @@
 //! From geometry to a scene that answers rays.
 
 use super::fault::Fault;
+use super::instance::Placed;
 use super::user::{self, PrimSet, UserSet};
 use super::{Device, Error};
 use crate::geom::TriangleMesh;
@@ -46,14 +47,25 @@ impl Default for SceneOptions {
 pub struct SceneBuilder {
     owner: Owner,
     quality: sys::RTCBuildQuality,
-    shapes: bool,
+    pub(super) contents: Contents,
+    pub(super) placed: Placed,
 }
 
 /// A built scene: it answers rays, on any number of threads, and never changes.
 pub struct Scene {
     owner: Owner,
-    pub(super) shapes: bool,
+    pub(super) contents: Contents,
+    pub(super) placed: Placed,
     pub(super) width: usize,
+}
+
+/// What a scene is made of.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Contents {
+    pub geometries: u32,
+    pub meshes: u32,
+    /// Shapes and instances, against which Embree never splits a packet.
+    pub unsplit: u64,
 }
 
 /// Fields are dropped in order: the C scene goes first, then what it points at, then the device.
@@ -107,7 +119,7 @@ impl SceneBuilder {
         // SAFETY: as above.
         unsafe { sys::rtcSetSceneBuildQuality(raw.as_ptr(), quality) };
         device.check("set the options of a scene")?;
-        Ok(Self { owner, quality, shapes: false })
+        Ok(Self { owner, quality, contents: Contents::default(), placed: Placed::default() })
     }
 
     /// Adds a mesh and returns its `geom_id`; ids count up from 0. The mesh is shared, not copied.
@@ -129,13 +141,17 @@ impl SceneBuilder {
             }
         };
         let (points, indices) = (mesh.padded_points().as_ptr().cast(), mesh.faces().as_ptr().cast());
-        self.owner.keep.push(mesh);
+        self.keep(mesh);
         share(sys::RTCBufferType::RTC_BUFFER_TYPE_VERTEX, sys::RTCFormat::RTC_FORMAT_FLOAT3, points, vertices);
         share(sys::RTCBufferType::RTC_BUFFER_TYPE_INDEX, sys::RTCFormat::RTC_FORMAT_UINT3, indices, faces);
+        self.contents.meshes += 1;
         self.attach(&geometry, "add a mesh")
     }
 
     /// Adds all shapes of `set` as one geometry and returns its `geom_id`; a hit's `prim_id` is the shape's number.
+    ///
+    /// A hit's `t` is the set's answer rounded once; its `ng`, `u` and `v` are zero: who wants to know more asks the
+    /// set, once for the hit that counts.
     ///
     /// # Errors
     /// [`Error::TooMany`] shapes, [`Error::OverBudget`], [`Error::OutOfMemory`], or [`Error::Call`].
@@ -144,7 +160,7 @@ impl SceneBuilder {
         let geometry = Geometry::new(&self.owner.device, sys::RTCGeometryType::RTC_GEOMETRY_TYPE_USER)?;
         let set = Arc::new(UserSet { prims: set, fault: self.owner.fault.clone() });
         let user = Arc::as_ptr(&set).cast_mut().cast::<c_void>();
-        self.owner.keep.push(set);
+        self.keep(set);
         // SAFETY: the geometry is live and ours alone.
         unsafe { sys::rtcSetGeometryUserPrimitiveCount(geometry.raw(), count) };
         // SAFETY: `keep` holds the set until the scene is released; callbacks only read it.
@@ -155,11 +171,11 @@ impl SceneBuilder {
         unsafe { sys::rtcSetGeometryIntersectFunction(geometry.raw(), Some(user::intersect::<S>)) };
         // SAFETY: as above. Without this one no shape would throw a shadow.
         unsafe { sys::rtcSetGeometryOccludedFunction(geometry.raw(), Some(user::occluded::<S>)) };
-        self.shapes = true;
+        self.contents.unsplit += u64::from(count);
         self.attach(&geometry, "add shapes")
     }
 
-    fn attach(&mut self, geometry: &Geometry, doing: &'static str) -> Result<u32, Error> {
+    pub(super) fn attach(&mut self, geometry: &Geometry, doing: &'static str) -> Result<u32, Error> {
         // SAFETY: the geometry is live. On the scene alone, low quality would still build the medium tree.
         unsafe { sys::rtcSetGeometryBuildQuality(geometry.raw(), self.quality) };
         // SAFETY: the geometry is live.
@@ -168,7 +184,17 @@ impl SceneBuilder {
         // SAFETY: scene and geometry are live; the scene takes a reference of its own.
         let id = unsafe { sys::rtcAttachGeometry(self.owner.raw.0.as_ptr(), geometry.raw()) };
         self.owner.device.check(doing)?;
+        self.contents.geometries += 1;
         Ok(id)
+    }
+
+    pub(super) fn device(&self) -> &Device {
+        &self.owner.device
+    }
+
+    /// Keeps `data` until the scene has been released.
+    pub(super) fn keep(&mut self, data: Arc<dyn Any + Send + Sync>) {
+        self.owner.keep.push(data);
     }
 
     /// Builds the tree, on the device's threads.
@@ -183,7 +209,7 @@ impl SceneBuilder {
     /// # Panics
     /// With the panic of `progress` or of a [`PrimSet::bounds`], if there was one.
     pub fn commit(self, progress: Option<&(dyn Fn(f64) -> bool + Sync)>) -> Result<Scene, Error> {
-        let Self { owner, shapes, .. } = self;
+        let Self { owner, contents, placed, .. } = self;
         let watch = Watch { progress, fault: &owner.fault, cancelled: AtomicBool::new(false) };
         let raw = owner.raw.0.as_ptr();
         let user = (&raw const watch).cast_mut().cast::<c_void>();
@@ -200,7 +226,7 @@ impl SceneBuilder {
         }
         built?;
         let width = owner.device.packet_width();
-        Ok(Scene { owner, shapes, width })
+        Ok(Scene { owner, contents, placed, width })
     }
 }
 
@@ -210,6 +236,7 @@ impl Scene {
     ///
     /// # Panics
     /// As said; on every call once there was one.
+    #[inline]
     pub fn resume_panics(&self) {
         self.owner.fault.resume();
     }
@@ -220,6 +247,10 @@ impl Scene {
         &self.owner.device
     }
 
+    pub(super) fn is_one_mesh(&self) -> bool {
+        (self.contents.geometries, self.contents.meshes) == (1, 1)
+    }
+
     #[inline]
     pub(super) fn raw(&self) -> sys::RTCScene {
         self.owner.raw.0.as_ptr()
@@ -228,27 +259,27 @@ impl Scene {
 
 impl fmt::Debug for SceneBuilder {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.debug_struct("SceneBuilder").field("geometries", &self.owner.keep.len()).finish_non_exhaustive()
+        f.debug_struct("SceneBuilder").field("geometries", &self.contents.geometries).finish_non_exhaustive()
     }
 }
 
 impl fmt::Debug for Scene {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.debug_struct("Scene").field("geometries", &self.owner.keep.len()).finish_non_exhaustive()
+        f.debug_struct("Scene").field("geometries", &self.contents.geometries).finish_non_exhaustive()
     }
 }
 
 /// Our own reference to a geometry; a scene that it is attached to has another.
-struct Geometry(NonNull<sys::RTCGeometryTy>);
+pub(super) struct Geometry(NonNull<sys::RTCGeometryTy>);
 
 impl Geometry {
-    fn new(device: &Device, kind: sys::RTCGeometryType) -> Result<Self, Error> {
+    pub fn new(device: &Device, kind: sys::RTCGeometryType) -> Result<Self, Error> {
         // SAFETY: the device is live.
         let raw = unsafe { sys::rtcNewGeometry(device.raw(), kind) };
         created(raw, device, "create a geometry").map(Self)
     }
 
-    fn raw(&self) -> sys::RTCGeometry {
+    pub fn raw(&self) -> sys::RTCGeometry {
         self.0.as_ptr()
     }
 }

@@ -1,9 +1,11 @@
 //! Shapes that Embree cannot build by itself: written in Rust, called back during traversal.
 
 use super::fault::Fault;
-use crate::geom::{Bounds, Ray};
+use crate::geom::{Bounds, Lanes, ShapeSet};
+use crate::simd::{self, Kernel};
 use embree4_sys as sys;
-use glam::Vec3;
+use std::any::Any;
+use std::mem::MaybeUninit;
 use std::sync::Arc;
 
 /// A set of primitives of one kind. `prim` is always below [`len`](Self::len) as it was when the set was added.
@@ -23,121 +25,31 @@ pub trait PrimSet: Send + Sync + 'static {
     /// or has a NaN is never hit.
     fn bounds(&self, prim: u32) -> Bounds;
 
-    /// Nearest hit of `prim` inside the ray's interval; one outside of it is dropped.
+    /// Parameters of the nearest points of `prim` in the open intervals of `N` rays; infinity in the lanes that
+    /// miss, `None` when all do. `N` is 1, 4, 8 or 16.
     ///
-    /// The direction may be a power of two times the one that was asked for, and `t` counts in units of it.
-    fn hit(&self, prim: u32, ray: &Ray) -> Option<PrimHit>;
-
-    /// [`hit`](Self::hit) for `N` rays at once; `N` is 1, 4, 8 or 16. `active` is 0 for lanes that hold no ray
-    /// (but any numbers), and what is answered for them is dropped. All lanes of `hits` are misses at first.
+    /// Some lanes may hold no ray but any numbers; what is answered for them is dropped. Directions may be a power
+    /// of two times the ones that were asked for, and parameters count in units of them.
     ///
-    /// Worth writing out as plain loops over the lanes, which the compiler turns into vector code: for 16 coherent
-    /// rays that made spheres five times as fast among a thousand of them, and 2.6 times among 100,000.
-    #[inline]
-    fn hit_lanes<const N: usize>(&self, prim: u32, rays: &RayLanes<N>, active: &[i32; N], hits: &mut PrimHits<N>) {
-        for (lane, _) in active.iter().enumerate().filter(|(_, a)| **a != 0) {
-            if let Some(hit) = self.hit(prim, &rays.get(lane)) {
-                hits.set(lane, &hit);
-            }
-        }
+    /// Called from a [`Kernel`]: marked `#[inline(always)]` and written as plain loops over the lanes it becomes the
+    /// widest vector code that the processor has.
+    fn hit_lanes<const N: usize>(&self, prim: u32, rays: &Lanes<'_, f32, N>) -> Option<[f64; N]>;
+}
+
+impl<S: ShapeSet + 'static> PrimSet for S {
+    fn len(&self) -> u32 {
+        ShapeSet::len(self)
+    }
+
+    fn bounds(&self, prim: u32) -> Bounds {
+        ShapeSet::bounds(self, prim)
+    }
+
+    #[inline(always)]
+    fn hit_lanes<const N: usize>(&self, prim: u32, rays: &Lanes<'_, f32, N>) -> Option<[f64; N]> {
+        self.hit_lanes_here(prim, rays)
     }
 }
-
-/// Where a ray meets a primitive.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PrimHit {
-    /// Ray parameter.
-    pub t: f32,
-    /// First surface parameter; what it means is the shape's own business.
-    pub u: f32,
-    /// Second surface parameter.
-    pub v: f32,
-    /// Geometric normal, outwards, of any length.
-    pub ng: Vec3,
-}
-
-/// [`PrimHit`] of `N` rays.
-#[derive(Clone, Debug)]
-pub struct PrimHits<const N: usize> {
-    /// Ray parameter; infinity for a miss.
-    pub t: [f32; N],
-    /// First surface parameter.
-    pub u: [f32; N],
-    /// Second surface parameter.
-    pub v: [f32; N],
-    /// Geometric normal, x.
-    pub ng_x: [f32; N],
-    /// Geometric normal, y.
-    pub ng_y: [f32; N],
-    /// Geometric normal, z.
-    pub ng_z: [f32; N],
-}
-
-impl<const N: usize> PrimHits<N> {
-    /// No lane hits.
-    pub const MISS: Self =
-        Self { t: [f32::INFINITY; N], u: [0.0; N], v: [0.0; N], ng_x: [0.0; N], ng_y: [0.0; N], ng_z: [0.0; N] };
-
-    /// Puts `hit` into `lane`.
-    #[inline]
-    pub fn set(&mut self, lane: usize, hit: &PrimHit) {
-        self.t[lane] = hit.t;
-        self.u[lane] = hit.u;
-        self.v[lane] = hit.v;
-        self.ng_x[lane] = hit.ng.x;
-        self.ng_y[lane] = hit.ng.y;
-        self.ng_z[lane] = hit.ng.z;
-    }
-}
-
-/// The rays of one callback, as Embree has them in memory: those of one packet, or some of them in another order.
-/// What tells them apart is their `id`.
-#[repr(C)]
-#[derive(Clone, Debug)]
-#[expect(missing_docs, reason = "the components of a ray, one array each, as in `RayPacket`")]
-pub struct RayLanes<const N: usize> {
-    pub o_x: [f32; N],
-    pub o_y: [f32; N],
-    pub o_z: [f32; N],
-    pub t_near: [f32; N],
-    pub d_x: [f32; N],
-    pub d_y: [f32; N],
-    pub d_z: [f32; N],
-    pub time: [f32; N],
-    /// Nearest hit so far.
-    pub t_far: [f32; N],
-    pub mask: [u32; N],
-    pub id: [u32; N],
-    pub flags: [u32; N],
-}
-
-impl<const N: usize> RayLanes<N> {
-    /// The ray of `lane`.
-    #[inline]
-    #[must_use]
-    pub fn get(&self, lane: usize) -> Ray {
-        Ray {
-            o: Vec3::new(self.o_x[lane], self.o_y[lane], self.o_z[lane]),
-            d: Vec3::new(self.d_x[lane], self.d_y[lane], self.d_z[lane]),
-            t_near: self.t_near[lane],
-            t_far: self.t_far[lane],
-        }
-    }
-}
-
-/// Places in Embree's packets, in units of `N` words: the rays' `tfar`, and the hits, which follow the rays.
-const T_FAR: usize = 8;
-const HIT: usize = 12;
-
-const _: () = {
-    use std::mem::{offset_of, size_of};
-    assert!(size_of::<RayLanes<1>>() == size_of::<sys::RTCRay>());
-    assert!(size_of::<RayLanes<16>>() == size_of::<sys::RTCRay16>());
-    assert!(offset_of!(RayLanes<16>, t_far) == offset_of!(sys::RTCRay16, tfar));
-    assert!(offset_of!(sys::RTCRay16, tfar) == T_FAR * 64 && offset_of!(sys::RTCRay, tfar) == T_FAR * 4);
-    assert!(offset_of!(sys::RTCRayHit16, hit) == HIT * 64 && offset_of!(sys::RTCRayHit, hit) == HIT * 4);
-    assert!(offset_of!(sys::RTCHit16, instPrimID) == 8 * 64 && offset_of!(sys::RTCHit, instPrimID) == 8 * 4);
-};
 
 /// What the user pointer of a geometry points at.
 pub(super) struct UserSet<S> {
@@ -173,20 +85,16 @@ pub(super) unsafe extern "C" fn intersect<S: PrimSet>(args: *const sys::RTCInter
     let args = unsafe { &*args };
     // SAFETY: as in `bounds`.
     let set = unsafe { &*args.geometryUserPtr.cast::<UserSet<S>>() };
-    // SAFETY: Embree always passes a context.
-    let context = unsafe { &*args.context };
-    let call = Call { set, prim: args.primID, valid: args.valid, words: args.rayhit.cast() };
-    let ids = [args.primID, args.geomID, context.instID[0], context.instPrimID[0]];
     match args.N {
         // SAFETY: `valid` has `N` entries and `rayhit` the `N` rays and hits of the callback.
-        1 => unsafe { call.intersect::<1>(ids) },
+        1 => unsafe { nearest::<S, 1>(set, args) },
         // SAFETY: as above.
-        4 => unsafe { call.intersect::<4>(ids) },
+        4 => unsafe { nearest::<S, 4>(set, args) },
         // SAFETY: as above.
-        8 => unsafe { call.intersect::<8>(ids) },
+        8 => unsafe { nearest::<S, 8>(set, args) },
         // SAFETY: as above.
-        16 => unsafe { call.intersect::<16>(ids) },
-        n => set.fault.raise(Box::new(format!("Embree called back with {n} rays, a number it is not known for"))),
+        16 => unsafe { nearest::<S, 16>(set, args) },
+        n => set.fault.raise(unknown_width(n)),
     }
 }
 
@@ -196,95 +104,177 @@ pub(super) unsafe extern "C" fn occluded<S: PrimSet>(args: *const sys::RTCOcclud
     let args = unsafe { &*args };
     // SAFETY: as in `bounds`.
     let set = unsafe { &*args.geometryUserPtr.cast::<UserSet<S>>() };
-    let call = Call { set, prim: args.primID, valid: args.valid, words: args.ray.cast() };
     match args.N {
         // SAFETY: `valid` has `N` entries and `ray` the `N` rays of the callback.
-        1 => unsafe { call.occluded::<1>() },
+        1 => unsafe { any::<S, 1>(set, args) },
         // SAFETY: as above.
-        4 => unsafe { call.occluded::<4>() },
+        4 => unsafe { any::<S, 4>(set, args) },
         // SAFETY: as above.
-        8 => unsafe { call.occluded::<8>() },
+        8 => unsafe { any::<S, 8>(set, args) },
         // SAFETY: as above.
-        16 => unsafe { call.occluded::<16>() },
-        n => set.fault.raise(Box::new(format!("Embree called back with {n} rays, a number it is not known for"))),
+        16 => unsafe { any::<S, 16>(set, args) },
+        n => set.fault.raise(unknown_width(n)),
     }
 }
 
-/// One callback. Word `i` of field `k` of a packet of `N` sits at `k * N + i`.
-struct Call<'a, S> {
-    set: &'a UserSet<S>,
+#[cold]
+fn unknown_width(n: u32) -> Box<dyn Any + Send> {
+    Box::new(format!("Embree called back with {n} rays, a number it is not known for"))
+}
+
+/// # Safety
+/// `valid` must have `N` entries, and `rayhit` the rays and hits of a packet of `N`.
+#[inline]
+unsafe fn nearest<S: PrimSet, const N: usize>(set: &UserSet<S>, args: &sys::RTCIntersectFunctionNArguments) {
+    // SAFETY: Embree always passes a context.
+    let context = unsafe { &*args.context };
+    let ids = [args.primID, args.geomID, context.instID[0], context.instPrimID[0]];
+    // SAFETY: the caller's promise; Embree leaves the packet to this call.
+    let packet = unsafe { Packet::<N, WITH_HITS>::new(args.valid, args.rayhit.cast()) };
+    set.fault.guard((), || run::<N>(Nearest { prims: &*set.prims, ids, packet }));
+}
+
+/// # Safety
+/// `valid` must have `N` entries, and `ray` the rays of a packet of `N`.
+#[inline]
+unsafe fn any<S: PrimSet, const N: usize>(set: &UserSet<S>, args: &sys::RTCOccludedFunctionNArguments) {
+    // SAFETY: the caller's promise; Embree leaves the packet to this call.
+    let packet = unsafe { Packet::<N, RAYS_ONLY>::new(args.valid, args.ray.cast()) };
+    set.fault.guard((), || run::<N>(InTheWay { prims: &*set.prims, prim: args.primID, packet }));
+}
+
+/// A single ray gains nothing from wide vectors.
+#[inline(always)]
+fn run<const N: usize>(kernel: impl Kernel<Output = ()>) {
+    if N == 1 { kernel.run() } else { simd::run(kernel) }
+}
+
+/// All of a callback is one kernel: handed out of it, the hits would go through memory.
+struct Nearest<'a, S, const N: usize> {
+    prims: &'a S,
+    /// Of the primitive, the geometry, the instance, and the primitive of the instance.
+    ids: [u32; 4],
+    packet: Packet<N, WITH_HITS>,
+}
+
+impl<S: PrimSet, const N: usize> Kernel for Nearest<'_, S, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(mut self) {
+        let Some(t) = self.prims.hit_lanes(self.ids[0], &self.packet.rays()) else { return };
+        let Some(found) = self.packet.found(&t) else { return };
+        self.packet.put(T_FAR, &found, |lane| (t[lane] as f32).to_bits());
+        for field in SURFACE..IDS {
+            self.packet.put(field, &found, |_| 0);
+        }
+        for (i, id) in self.ids.into_iter().enumerate() {
+            self.packet.put(IDS + i, &found, |_| id);
+        }
+    }
+}
+
+struct InTheWay<'a, S, const N: usize> {
+    prims: &'a S,
     prim: u32,
+    packet: Packet<N, RAYS_ONLY>,
+}
+
+impl<S: PrimSet, const N: usize> Kernel for InTheWay<'_, S, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(mut self) {
+        let Some(t) = self.prims.hit_lanes(self.prim, &self.packet.rays()) else { return };
+        let Some(found) = self.packet.found(&t) else { return };
+        self.packet.put(T_FAR, &found, |_| f32::NEG_INFINITY.to_bits());
+    }
+}
+
+/// Fields of a ray: origin, direction, and the interval.
+const ORIGIN: usize = 0;
+const T_NEAR: usize = 3;
+const DIRECTION: usize = 4;
+const T_FAR: usize = 8;
+/// Fields of a hit, which follow those of the rays: normal, u and v, then the ids.
+const SURFACE: usize = 12;
+const IDS: usize = 17;
+
+/// Numbers of fields.
+const RAYS_ONLY: usize = SURFACE;
+const WITH_HITS: usize = IDS + 4;
+
+const _: () = {
+    use std::mem::{offset_of, size_of};
+    use sys::{RTCRay, RTCRay16, RTCRayHit, RTCRayHit16};
+    assert!(offset_of!(RTCRayHit, ray.org_x) == 4 * ORIGIN && offset_of!(RTCRayHit16, ray.org_x) == 64 * ORIGIN);
+    assert!(offset_of!(RTCRayHit, ray.tnear) == 4 * T_NEAR && offset_of!(RTCRayHit16, ray.tnear) == 64 * T_NEAR);
+    assert!(offset_of!(RTCRayHit, ray.dir_x) == 4 * DIRECTION && offset_of!(RTCRayHit16, ray.dir_x) == 64 * DIRECTION);
+    assert!(offset_of!(RTCRayHit, ray.tfar) == 4 * T_FAR && offset_of!(RTCRayHit16, ray.tfar) == 64 * T_FAR);
+    assert!(offset_of!(RTCRayHit, hit.Ng_x) == 4 * SURFACE && offset_of!(RTCRayHit16, hit.Ng_x) == 64 * SURFACE);
+    assert!(offset_of!(RTCRayHit, hit.primID) == 4 * IDS && offset_of!(RTCRayHit16, hit.primID) == 64 * IDS);
+    assert!(offset_of!(RTCRayHit16, hit.instPrimID) == 64 * (WITH_HITS - 1));
+    assert!(size_of::<RTCRay>() == 4 * RAYS_ONLY && size_of::<RTCRay16>() == 64 * RAYS_ONLY);
+};
+
+/// Embree's memory of the rays of one callback, those of one packet or some of them in another order: `FIELDS` of
+/// `N` words, lane after lane.
+struct Packet<const N: usize, const FIELDS: usize> {
     valid: *const i32,
     words: *mut u32,
 }
 
-impl<S: PrimSet> Call<'_, S> {
+impl<const N: usize, const FIELDS: usize> Packet<N, FIELDS> {
     /// # Safety
-    /// `valid` must have `N` entries, and `words` the rays and hits of a packet of `N`.
-    #[inline]
-    unsafe fn intersect<const N: usize>(&self, ids: [u32; 4]) {
-        let keep = |lane: usize, hits: &PrimHits<N>| {
-            let floats = [hits.ng_x[lane], hits.ng_y[lane], hits.ng_z[lane], hits.u[lane], hits.v[lane]];
-            // SAFETY: a lane of `N`, in the ray's part.
-            unsafe { self.write::<N>(T_FAR, lane, hits.t[lane].to_bits()) };
-            for (field, word) in floats.map(f32::to_bits).into_iter().chain(ids).enumerate() {
-                // SAFETY: a lane of `N`; the hit's part has these nine fields.
-                unsafe { self.write::<N>(HIT + field, lane, word) };
-            }
-        };
-        // SAFETY: the caller's promise.
-        unsafe { self.each_hit(keep) };
+    /// While the packet is in use, `valid` must be `N` numbers, and `words` `FIELDS * N` words that nobody else uses,
+    /// those of the rays initialised.
+    #[inline(always)]
+    unsafe fn new(valid: *const i32, words: *mut u32) -> Self {
+        Self { valid, words }
     }
 
-    /// # Safety
-    /// `valid` must have `N` entries, and `words` the rays of a packet of `N`.
-    #[inline]
-    unsafe fn occluded<const N: usize>(&self) {
-        let keep = |lane: usize, _: &PrimHits<N>| {
-            // SAFETY: a lane of `N`, in the ray's part.
-            unsafe { self.write::<N>(T_FAR, lane, f32::NEG_INFINITY.to_bits()) };
-        };
-        // SAFETY: the caller's promise.
-        unsafe { self.each_hit(keep) };
+    #[inline(always)]
+    fn floats(&self, field: usize) -> &[f32; N] {
+        assert!(field < RAYS_ONLY && RAYS_ONLY <= FIELDS);
+        // SAFETY: the field is inside the packet.
+        let first = unsafe { self.words.add(field * N) };
+        // SAFETY: as above, and initialised: any word is a float. Writing takes `&mut self`.
+        unsafe { &*first.cast() }
     }
 
-    /// Calls `keep` for each active lane that the primitive is hit by inside its interval.
-    ///
-    /// # Safety
-    /// `valid` must have `N` entries, and `words` the rays of a packet of `N`.
-    #[inline]
-    unsafe fn each_hit<const N: usize>(&self, keep: impl Fn(usize, &PrimHits<N>)) {
-        // All of it inside the guard: handed out of it, the hits would go through memory even when there is none.
-        self.set.fault.guard((), || {
-            // SAFETY: the caller's promise.
-            let active = unsafe { &*self.valid.cast::<[i32; N]>() };
-            // SAFETY: as above; `RayLanes` are words laid out as C's, and every bit pattern is one. The last use is
-            // ahead of the first `keep`, which writes there.
-            let rays = unsafe { &*self.words.cast::<RayLanes<N>>() };
-            let mut hits = PrimHits::MISS;
-            self.set.prims.hit_lanes(self.prim, rays, active, &mut hits);
-            let mut found = [false; N];
-            let mut any = false;
-            for lane in 0..N {
-                let t = hits.t[lane];
-                // A NaN fails.
-                found[lane] = (active[lane] != 0) & (t > rays.t_near[lane]) & (t < rays.t_far[lane]);
-                any |= found[lane];
-            }
-            if any {
-                (0..N).filter(|&lane| found[lane]).for_each(|lane| keep(lane, &hits));
-            }
-        });
+    #[inline(always)]
+    fn rays(&self) -> Lanes<'_, f32, N> {
+        let axes = |field| [self.floats(field), self.floats(field + 1), self.floats(field + 2)];
+        Lanes { o: axes(ORIGIN), d: axes(DIRECTION), t_near: self.floats(T_NEAR), t_far: self.floats(T_FAR) }
     }
 
-    /// # Safety
-    /// The packet must have `field`, and `lane < N`.
-    #[inline]
-    unsafe fn write<const N: usize>(&self, field: usize, lane: usize, word: u32) {
-        // SAFETY: the caller's promise.
-        let place = unsafe { self.words.add(field * N + lane) };
-        // SAFETY: inside the packet, which is this call's alone.
-        unsafe { place.write(word) };
+    /// The active lanes in which `t` is below infinity, if there are any. A NaN is not.
+    #[inline(always)]
+    fn found(&self, t: &[f64; N]) -> Option<[bool; N]> {
+        // SAFETY: the promise of `new`.
+        let valid = unsafe { &*self.valid.cast::<[i32; N]>() };
+        let mut found = [false; N];
+        let mut any = false;
+        for lane in 0..N {
+            found[lane] = (valid[lane] != 0) & (t[lane] < f64::INFINITY);
+            any |= found[lane];
+        }
+        any.then_some(found)
+    }
+
+    /// Puts `word` into the lanes that `found` something. The others get what they have, be it uninitialised: such a
+    /// blend of whole fields is a few vector instructions, where a branch per lane cost a fifth of the callback.
+    #[inline(always)]
+    fn put(&mut self, field: usize, found: &[bool; N], word: impl Fn(usize) -> u32) {
+        assert!(field < FIELDS);
+        // SAFETY: the field is inside the packet.
+        let first = unsafe { self.words.add(field * N) };
+        // SAFETY: as above, and nobody else uses it.
+        let lanes = unsafe { &mut *first.cast::<[MaybeUninit<u32>; N]>() };
+        let (old, new): ([_; N], [_; N]) = (*lanes, std::array::from_fn(word));
+        for lane in 0..N {
+            lanes[lane] = if found[lane] { MaybeUninit::new(new[lane]) } else { old[lane] };
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Axis-aligned boxes.
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 /// An axis-aligned box; empty when `lo > hi` in any axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +31,18 @@ impl Bounds {
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
+    }
+
+    /// Box around the box that `to` makes of this one.
+    #[must_use]
+    pub fn under(&self, to: &DAffine3) -> Self {
+        if self.is_empty() {
+            return *self;
+        }
+        let (m, half) = (to.matrix3, 0.5 * self.hi - 0.5 * self.lo);
+        let half = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z;
+        let center = to.transform_point3(self.center());
+        Self { lo: center - half, hi: center + half }
     }
 
     /// Middle of the box; zero for an empty one.

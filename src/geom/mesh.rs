@@ -1,7 +1,7 @@
 //! A triangle mesh as both backends read it: stored once, in f32, padded as Embree asks.
 
 use super::Bounds;
-use glam::{DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
 /// What the indices of a face hold that can never be hit. It keeps its place, so that
@@ -59,12 +59,35 @@ impl TriangleMesh {
         if points.len().is_multiple_of(3) {
             points.push(0.0);
         }
-        const CHUNK: usize = 1 << 14;
-        let (faults, bounds) = faces
-            .par_chunks_mut(CHUNK)
-            .map(|chunk| inspect(&points, chunk))
-            .reduce(|| (Faults::default(), Bounds::EMPTY), |a, b| (a.0.plus(b.0), a.1.union(b.1)));
+        let (faults, bounds) = inspect_all(&points, &mut faces);
         Self { points, faces, faults, bounds }
+    }
+
+    /// The mesh with every vertex where `to` takes it, computed in f64 and rounded once. A triangle
+    /// that can no longer be hit there counts with the others.
+    #[must_use]
+    pub fn moved(mut self, to: &DAffine3) -> Self {
+        let vertices = self.vertex_count();
+        self.points[..3 * vertices].par_chunks_mut(3 * CHUNK).for_each(|chunk| {
+            for p in chunk.chunks_exact_mut(3) {
+                let moved = to.transform_point3(Vec3::from_slice(p).as_dvec3());
+                p.copy_from_slice(&moved.as_vec3().to_array());
+            }
+        });
+        let (found, bounds) = inspect_all(&self.points, &mut self.faces);
+        // What was bad before has lost its indices, and counts already.
+        let faults = self.faults.plus(Faults { out_of_range: 0, ..found });
+        Self { faults, bounds, ..self }
+    }
+
+    /// Box around where `to` takes every triangle that can be hit, in f64.
+    #[must_use]
+    pub fn bounds_under(&self, to: &DAffine3) -> Bounds {
+        let corners = |chunk: &[[u32; 3]]| -> Bounds {
+            let good = chunk.iter().filter(|&&face| face != BAD_FACE).flatten();
+            good.map(|&i| to.transform_point3(self.point(i).as_dvec3())).collect()
+        };
+        self.faces.par_chunks(CHUNK).map(corners).reduce(|| Bounds::EMPTY, Bounds::union)
     }
 
     /// Vertices, used or not.
@@ -130,6 +153,14 @@ impl TriangleMesh {
     pub fn bytes(&self) -> usize {
         size_of_val(&self.points[..]) + size_of_val(&self.faces[..])
     }
+}
+
+/// Triangles or vertices in one unit of work.
+const CHUNK: usize = 1 << 14;
+
+fn inspect_all(points: &[f32], faces: &mut [[u32; 3]]) -> (Faults, Bounds) {
+    let parts = faces.par_chunks_mut(CHUNK).map(|chunk| inspect(points, chunk));
+    parts.reduce(|| (Faults::default(), Bounds::EMPTY), |a, b| (a.0.plus(b.0), a.1.union(b.1)))
 }
 
 fn inspect(points: &[f32], faces: &mut [[u32; 3]]) -> (Faults, Bounds) {
@@ -203,6 +234,28 @@ mod tests {
         assert!(mesh.faces()[1..7].iter().all(|&f| f == BAD_FACE));
         assert_eq!(mesh.bounds(), Bounds { lo: DVec3::ZERO, hi: DVec3::new(2.0, 1.0, 0.0) });
         assert!(mesh.padded_points().len() > 3 * mesh.vertex_count());
+    }
+
+    #[test]
+    fn a_mesh_is_moved_in_f64_and_counts_what_vanishes() {
+        let points =
+            vec![0., 0., 0., 1., 0., 0., 0., 1., 0., 1e-30, 0., 0., 0., 1e-30, 0., f32::NAN, 0., 0., 9., 9., 9.];
+        let mesh = TriangleMesh::new(points, vec![[0, 1, 2], [0, 1, 1], [0, 1, 5], [0, 3, 4], [0, 1, 9]]);
+        assert_eq!(mesh.faults(), Faults { non_finite: 1, out_of_range: 1, degenerate: 1 });
+        let to = DAffine3::from_mat3_translation(
+            glam::DMat3::from_diagonal(DVec3::new(2.0, 1.0, -1.0)),
+            DVec3::new(1.0, 16_777_217.0 * 2f64.powi(-24), 3.0),
+        );
+        let under = mesh.bounds_under(&to);
+        let moved = mesh.moved(&to);
+        // The tiny one has shrunk to a point; vertex 6 is no triangle's.
+        assert_eq!(moved.faults(), Faults { non_finite: 1, out_of_range: 1, degenerate: 2 });
+        assert_eq!(moved.faces()[0], [0, 1, 2]);
+        assert_eq!(moved.point(1).to_array(), [3.0, 1.0, 3.0]);
+        assert_eq!((moved.face_count(), moved.vertex_count()), (5, 7));
+        assert_eq!(moved.bounds(), Bounds { lo: DVec3::new(1.0, 1.0, 3.0), hi: DVec3::new(3.0, 2.0, 3.0) });
+        assert_eq!(under.lo.y, 16_777_217.0 * 2f64.powi(-24), "not rounded");
+        assert_eq!((under.lo.x, under.hi.x), (1.0, 3.0));
     }
 
     #[test]

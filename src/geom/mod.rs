@@ -11,6 +11,7 @@ mod ray;
 mod shape;
 mod shape_set;
 mod sphere;
+mod transform;
 pub mod triangle;
 
 pub use bounds::Bounds;
@@ -22,6 +23,7 @@ pub use packet::{Coherence, HitLanes, LANES, PacketBatch, RayHitPacket, RayPacke
 pub use quad::Quad;
 pub use ray::{Hit, INVALID_ID, Ray};
 pub use shape::{Lanes, Shape, ShapeError, ShapePoint};
-pub use shape_set::{Affine, Plain, ShapeSet, invert};
-pub(crate) use shape_set::{cofactors, normal_matrix};
+pub use shape_set::{Affine, Plain, ShapeSet};
 pub use sphere::Sphere;
+pub use transform::invert;
+pub(crate) use transform::{cofactors, mirrors, normal_matrix};

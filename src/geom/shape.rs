@@ -200,9 +200,9 @@ pub(super) fn some_hit(t: f64) -> Option<f64> {
 /// `t` unless all lanes miss.
 #[inline(always)]
 pub(super) fn some_lane<const N: usize>(t: [f64; N]) -> Option<[f64; N]> {
-    let mut nearest = f64::INFINITY;
+    let mut any = 0u64;
     for x in t {
-        nearest = if x < nearest { x } else { nearest };
+        any |= u64::from(x < f64::INFINITY);
     }
-    (nearest < f64::INFINITY).then_some(t)
+    (any != 0).then_some(t)
 }

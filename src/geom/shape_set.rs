@@ -1,5 +1,6 @@
 //! Many shapes of one class, as backends take them: a loop or callback per class, no dispatch per shape.
 
+use super::transform::{invert, normal_matrix};
 use super::{Bounds, Lanes, Shape, ShapeError, ShapePoint};
 use crate::simd::{self, Kernel};
 use glam::{DAffine3, DMat3, DVec3};
@@ -30,7 +31,20 @@ pub trait ShapeSet: Send + Sync {
     }
 
     /// [`hit`](Self::hit) for `N` rays, the same bits: infinity in the lanes that miss, `None` when all do.
+    #[inline]
     fn hit_lanes<T: Copy + Into<f64>, const N: usize>(&self, prim: u32, rays: &Lanes<'_, T, N>) -> Option<[f64; N]>
+    where
+        Self: Sized,
+    {
+        if N == 1 { self.hit_lanes_here(prim, rays) } else { simd::run(HitLanes { set: self, prim, rays }) }
+    }
+
+    /// [`hit_lanes`](Self::hit_lanes) in the instructions of the caller: for a [`Kernel`] to inline.
+    fn hit_lanes_here<T: Copy + Into<f64>, const N: usize>(
+        &self,
+        prim: u32,
+        rays: &Lanes<'_, T, N>,
+    ) -> Option<[f64; N]>
     where
         Self: Sized;
 
@@ -58,8 +72,23 @@ fn next_id(len: usize) -> u32 {
     u32::try_from(len).ok().filter(|&id| id < super::INVALID_ID).expect("fewer than 2^32 - 1 shapes fit in memory")
 }
 
+struct HitLanes<'a, S, T, const N: usize> {
+    set: &'a S,
+    prim: u32,
+    rays: &'a Lanes<'a, T, N>,
+}
+
+impl<S: ShapeSet, T: Copy + Into<f64>, const N: usize> Kernel for HitLanes<'_, S, T, N> {
+    type Output = Option<[f64; N]>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        self.set.hit_lanes_here(self.prim, self.rays)
+    }
+}
+
 /// A packet of one: the single test leaves early, which the loop over lanes cannot.
-#[inline]
+#[inline(always)]
 fn one_lane<T: Copy + Into<f64>, const N: usize>(
     set: &impl ShapeSet,
     prim: u32,
@@ -111,31 +140,18 @@ impl<S: Shape> ShapeSet for Plain<S> {
         self.shapes[prim as usize].hit(o, d, t_near, t_far)
     }
 
-    #[inline]
-    fn hit_lanes<T: Copy + Into<f64>, const N: usize>(&self, prim: u32, rays: &Lanes<'_, T, N>) -> Option<[f64; N]> {
-        if N == 1 {
-            return one_lane(self, prim, rays);
-        }
-        simd::run(PlainKernel { shape: &self.shapes[prim as usize], rays })
+    #[inline(always)]
+    fn hit_lanes_here<T: Copy + Into<f64>, const N: usize>(
+        &self,
+        prim: u32,
+        rays: &Lanes<'_, T, N>,
+    ) -> Option<[f64; N]> {
+        if N == 1 { one_lane(self, prim, rays) } else { self.shapes[prim as usize].hit_lanes(rays) }
     }
 
     #[inline]
     fn refine_for(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t: f64, uv: bool) -> ShapePoint {
         self.shapes[prim as usize].refine_for(o, d, t_near, t, uv)
-    }
-}
-
-struct PlainKernel<'a, S, T, const N: usize> {
-    shape: &'a S,
-    rays: &'a Lanes<'a, T, N>,
-}
-
-impl<S: Shape, T: Copy + Into<f64>, const N: usize> Kernel for PlainKernel<'_, S, T, N> {
-    type Output = Option<[f64; N]>;
-
-    #[inline(always)]
-    fn run(self) -> Self::Output {
-        self.shape.hit_lanes(self.rays)
     }
 }
 
@@ -210,12 +226,25 @@ impl<S: Shape> ShapeSet for Affine<S> {
         placed.shape.hit(o, d, t_near, t_far)
     }
 
-    #[inline]
-    fn hit_lanes<T: Copy + Into<f64>, const N: usize>(&self, prim: u32, rays: &Lanes<'_, T, N>) -> Option<[f64; N]> {
+    #[inline(always)]
+    fn hit_lanes_here<T: Copy + Into<f64>, const N: usize>(
+        &self,
+        prim: u32,
+        rays: &Lanes<'_, T, N>,
+    ) -> Option<[f64; N]> {
         if N == 1 {
             return one_lane(self, prim, rays);
         }
-        simd::run(AffineKernel { placed: &self.placed[prim as usize], rays })
+        let placed = &self.placed[prim as usize];
+        let (mut o, mut d) = ([[0.0; N]; 3], [[0.0; N]; 3]);
+        let (mut t_near, mut t_far) = ([0.0; N], [0.0; N]);
+        for i in 0..N {
+            let (o_i, d_i) = placed.local_ray(rays.o(i), rays.d(i));
+            (o[0][i], o[1][i], o[2][i]) = o_i.into();
+            (d[0][i], d[1][i], d[2][i]) = d_i.into();
+            (t_near[i], t_far[i]) = (rays.t_near(i), rays.t_far(i));
+        }
+        placed.shape.hit_lanes(&Lanes { o: o.each_ref(), d: d.each_ref(), t_near: &t_near, t_far: &t_far })
     }
 
     fn refine_for(&self, prim: u32, o: DVec3, d: DVec3, t_near: f64, t: f64, uv: bool) -> ShapePoint {
@@ -230,73 +259,5 @@ impl<S: Shape> ShapeSet for Affine<S> {
             extent: 0.5 * self.bounds(prim).size().max_element(),
             ..local
         }
-    }
-}
-
-struct AffineKernel<'a, S, T, const N: usize> {
-    placed: &'a Placed<S>,
-    rays: &'a Lanes<'a, T, N>,
-}
-
-impl<S: Shape, T: Copy + Into<f64>, const N: usize> Kernel for AffineKernel<'_, S, T, N> {
-    type Output = Option<[f64; N]>;
-
-    #[inline(always)]
-    fn run(self) -> Self::Output {
-        let (mut o, mut d) = ([[0.0; N]; 3], [[0.0; N]; 3]);
-        let (mut t_near, mut t_far) = ([0.0; N], [0.0; N]);
-        for i in 0..N {
-            let (o_i, d_i) = self.placed.local_ray(self.rays.o(i), self.rays.d(i));
-            (o[0][i], o[1][i], o[2][i]) = o_i.into();
-            (d[0][i], d[1][i], d[2][i]) = d_i.into();
-            (t_near[i], t_far[i]) = (self.rays.t_near(i), self.rays.t_far(i));
-        }
-        self.placed.shape.hit_lanes(&Lanes { o: o.each_ref(), d: d.each_ref(), t_near: &t_near, t_far: &t_far })
-    }
-}
-
-/// Exact power of two near the largest entry of `m`: with it divided out, no determinant over- or underflows.
-fn magnitude(m: &DMat3) -> f64 {
-    let largest = m.to_cols_array().into_iter().fold(0.0, |a: f64, x| a.max(x.abs()));
-    let exponent = (largest.to_bits() >> 52) as i32 - 1023;
-    2f64.powi(exponent.clamp(-1000, 1000))
-}
-
-/// Columns of the cofactor matrix: what takes the cross product of two edges to that of the moved ones.
-pub(crate) fn cofactors(m: &DMat3) -> DMat3 {
-    let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
-    DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y))
-}
-
-/// What takes normals to world space: the cofactor matrix with the determinant's sign, which is the
-/// inverse transpose up to a positive factor, without a division.
-pub(crate) fn normal_matrix(m: &DMat3) -> DMat3 {
-    let m = *m * (1.0 / magnitude(m));
-    let cof = cofactors(&m);
-    let det = m.x_axis.dot(cof.x_axis);
-    cof * det.signum()
-}
-
-/// Inverse of the linear part of `to_world`. A ray goes back by `inverse * (o - translation)` and `inverse * d`.
-///
-/// # Errors
-/// As [`Affine::push`].
-pub fn invert(to_world: &DAffine3) -> Result<DMat3, ShapeError> {
-    /// Share of the box's volume that the rounding of the entries alone can make.
-    const NOTHING: f64 = 4e-15;
-    if !to_world.is_finite() {
-        return Err(ShapeError::TransformNotFinite);
-    }
-    let scale = 1.0 / magnitude(&to_world.matrix3);
-    let m = to_world.matrix3 * scale;
-    let cof = cofactors(&m);
-    let det = m.x_axis.dot(cof.x_axis);
-    let volume = det.abs() / (m.x_axis.length() * m.y_axis.length() * m.z_axis.length());
-    let inverse = cof.transpose() * (1.0 / det) * scale;
-    // A NaN, from an axis of length 0, is no volume either.
-    if volume >= NOTHING && inverse.is_finite() {
-        Ok(inverse)
-    } else {
-        Err(ShapeError::Singular { volume: if volume > 0.0 { volume } else { 0.0 } })
     }
 }

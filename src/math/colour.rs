@@ -19,6 +19,19 @@ pub fn srgb(linear: f64) -> f64 {
     }
 }
 
+/// The inverse of [`srgb`] on `[0, 1]`.
+#[must_use]
+pub fn linear(srgb: f64) -> f64 {
+    if srgb <= 0.040_45 { srgb / 12.92 } else { ((srgb + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Linear light of every sRGB byte.
+#[must_use]
+pub fn linear_of_srgb8() -> &'static [f32; 256] {
+    static TABLE: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| linear(i as f64 / 255.0) as f32));
+    &TABLE
+}
+
 /// The byte by the formula: slow, and what [`Srgb8`] is tested against.
 #[must_use]
 pub fn srgb8_by_formula(linear: f32) -> u8 {
@@ -84,8 +97,7 @@ impl Srgb8 {
 /// Least `f32` that the formula turns into at least `byte` (1..=255).
 fn least_input_of(byte: u8) -> f32 {
     let level = (f64::from(byte) - 0.5) / 255.0;
-    let inverse = if level <= 12.92 * 0.003_130_8 { level / 12.92 } else { ((level + 0.055) / 1.055).powf(2.4) };
-    let mut x = inverse as f32;
+    let mut x = linear(level) as f32;
     while srgb8_by_formula(x) < byte {
         x = x.next_up();
     }
@@ -159,9 +171,9 @@ mod tests {
     #[test]
     fn bytes_survive_the_way_back() {
         for byte in 0..=255u8 {
-            let level = f64::from(byte) / 255.0;
-            let linear = if level <= 0.040_45 { level / 12.92 } else { ((level + 0.055) / 1.055).powf(2.4) };
-            assert_eq!(Srgb8::table().byte(linear as f32), byte);
+            let linear = linear_of_srgb8()[usize::from(byte)];
+            assert_eq!(Srgb8::table().byte(linear), byte);
+            assert!((srgb(f64::from(linear)) - f64::from(byte) / 255.0).abs() < 1e-7);
         }
     }
 }

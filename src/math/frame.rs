@@ -85,6 +85,28 @@ impl Frame {
         Self { origin, exponent: 0 }.rescaled(typical)
     }
 
+    /// A frame for things of different sizes, each given by its middle and half its size (above 0),
+    /// that together fill the box from `lo` to `hi`.
+    ///
+    /// The origin is where the sum of all distances to the middles, each in sizes of its thing, is
+    /// least, axis by axis: a coordinate of a thing then keeps the most digits of its size,
+    /// and neither a floor nor a sky moves the origin away from what stands on it. Everything ends up within
+    /// `[-1, 1]`, but for what is a thousand times as far away as things are on average, weighed
+    /// likewise. No things give [`IDENTITY`](Self::IDENTITY).
+    #[must_use]
+    pub fn around(things: &[(DVec3, f64)], (lo, hi): (DVec3, DVec3)) -> Self {
+        /// Far things shrink the others at most so much: f32 has room for more.
+        const SHRINK: f64 = 1.0 / (1 << 30) as f64;
+        let Some(least) = things.iter().map(|t| t.1).reduce(f64::min) else { return Self::IDENTITY };
+        let weights: Vec<f64> = things.iter().map(|t| least / t.1).collect();
+        let origin = DVec3::from_array([0, 1, 2].map(|axis| weighted_median(things, &weights, axis)));
+        let distance = |t: &(DVec3, f64)| (t.0 - origin).abs().max_element() + t.1;
+        let sum: f64 = things.iter().zip(&weights).map(|(t, w)| w * distance(t)).sum();
+        let reach = (lo - origin).abs().max((hi - origin).abs()).max_element();
+        let typical = reach.min(1024.0 * sum / weights.iter().sum::<f64>());
+        Self { origin, exponent: 0 }.rescaled(typical.max(SHRINK * reach))
+    }
+
     /// The same origin, and the exponent that brings a stored length of `reach` to
     /// `[0.5, 1)`. Keeps the frame as it is when `reach` is zero or not finite.
     #[must_use]
@@ -120,9 +142,61 @@ fn quantile_box(points: &[DVec3], trim: usize) -> (DVec3, DVec3) {
     (lo, hi)
 }
 
+/// The coordinate with half of the weight on either side; in the middle where two serve.
+fn weighted_median(things: &[(DVec3, f64)], weights: &[f64], axis: usize) -> f64 {
+    let mut order: Vec<(f64, f64)> = things.iter().zip(weights).map(|(t, &w)| (t.0[axis], w)).collect();
+    order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * order.iter().map(|o| o.1).sum::<f64>();
+    let mut below = 0.0;
+    let mut sums = order.iter().map(|&(x, w)| {
+        below += w;
+        (x, below)
+    });
+    let last = order.last().map_or(0.0, |o| o.0);
+    let (low, sum) = sums.find(|&(_, sum)| sum >= half).unwrap_or((last, f64::INFINITY));
+    let high = if sum > half { low } else { sums.next().map_or(last, |(x, _)| x) };
+    0.5 * low + 0.5 * high
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn around(things: &[(DVec3, f64)]) -> Frame {
+        let lo = things.iter().fold(DVec3::INFINITY, |lo, t| lo.min(t.0 - t.1));
+        let hi = things.iter().fold(DVec3::NEG_INFINITY, |hi, t| hi.max(t.0 + t.1));
+        Frame::around(things, (lo, hi))
+    }
+
+    #[test]
+    fn small_things_hold_the_origin() {
+        let at = DVec3::new(500_000.3, 4_649_776.2, 112.9);
+        let ball = (at, 1.0);
+        assert_eq!(around(&[ball]), Frame { origin: at, exponent: 1 });
+        // A floor that lies to one side, and a sky around it all.
+        let (floor, sky) = ((at + DVec3::new(5e4, -1.0, 5e4), 5e4), (DVec3::ZERO, 1e9));
+        for things in [vec![ball, floor], vec![floor, ball, sky]] {
+            let frame = around(&things);
+            assert_eq!(frame.origin, at);
+            assert!((8..=16).contains(&frame.exponent), "{}", frame.exponent);
+        }
+        let pair = around(&[(DVec3::X, 1.0), (3.0 * DVec3::X, 1.0)]);
+        assert_eq!(pair, Frame { origin: 2.0 * DVec3::X, exponent: 2 });
+    }
+
+    #[test]
+    fn any_size_is_brought_to_about_one() {
+        for size in [1e-300, 1e-30, 1.0, 1e30, 1e299] {
+            let things: Vec<_> = grid(DVec3::splat(size), size).into_iter().map(|p| (p, 0.05 * size)).collect();
+            let frame = around(&things);
+            let reach = things.iter().map(|t| frame.to_local(t.0).abs().max_element()).fold(0.0, f64::max);
+            assert!((0.25..=1.0).contains(&reach), "size {size:e}: {reach}");
+        }
+        // The smallest of all does not decide alone.
+        let frame = around(&[(DVec3::ZERO, 1e-200), (DVec3::ZERO, 1e100)]);
+        assert!(frame.to_local(DVec3::splat(1e100)).x <= 2f64.powi(30));
+        assert_eq!(Frame::around(&[], (DVec3::INFINITY, DVec3::NEG_INFINITY)), Frame::IDENTITY);
+    }
 
     fn grid(at: DVec3, size: f64) -> Vec<DVec3> {
         (0..1000)

@@ -39,7 +39,8 @@ impl Radiance {
             let white = |f: fn(&crate::scene::Textured) -> Vec3| m.texture.as_ref().map_or(Vec3::ZERO, f);
             let ambient = m.ambient + white(|t| t.ambient);
             let lit = m.diffuse + m.specular + white(|t| t.diffuse + t.specular);
-            let at_hit = m.emission + ambient * scene.ambient + lights.unwrap_or(Vec3::ZERO) * lit;
+            let emission = m.emission + white(|t| t.emission);
+            let at_hit = emission + ambient * scene.ambient + lights.unwrap_or(Vec3::ZERO) * lit;
             local = local.max(at_hit.max_element());
             rho = rho.max(m.passed_on());
         }

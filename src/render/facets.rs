@@ -7,7 +7,7 @@ use super::paint::Palette;
 use crate::geom::{LANES, RayHitPacket};
 use crate::scene::{Instance, Mesh, Object, Scene};
 use crate::simd::{self, Kernel};
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 /// What hits of triangles are computed from.
 #[repr(align(64))]
@@ -36,13 +36,6 @@ fn mesh_of(scene: &Scene, geom: u32) -> (&Mesh, Option<&Instance>) {
         Object::Instance(instance) => (&instance.mesh, Some(instance)),
         Object::Shapes(_) => unreachable!("hits of shapes are collected apart"),
     }
-}
-
-/// Corners two and three change places where the placement mirrors space, so that the winding
-/// again tells the outside.
-#[inline]
-fn wound<T>(mesh: &Mesh, [a, b, c]: [T; 3]) -> [T; 3] {
-    if mesh.mirrored { [a, c, b] } else { [a, b, c] }
 }
 
 #[inline]
@@ -86,40 +79,56 @@ impl Facets {
         }
         for lane in 0..block.len {
             let (mesh, placed) = mesh_of(scene, self.geom[lane]);
-            let corners = faces[lane].map(|i| mesh.data.triangles.point(i));
+            for (to, i) in self.corners.iter_mut().zip(faces[lane]) {
+                set(to, lane, mesh.data.triangles.point(i));
+            }
             let normals = normals[lane].and_then(|at| mesh.data.normals_at(at));
             self.smooth[lane] = normals.is_some();
-            let normals = normals.unwrap_or_default();
-            let (corners, normals) = match placed {
-                None => (corners, normals),
-                Some(instance) => self.place(lane, instance, corners, normals),
-            };
-            for (to, p) in self.corners.iter_mut().zip(wound(mesh, corners)) {
-                set(to, lane, p);
-            }
-            for (to, n) in self.normals.iter_mut().zip(wound(mesh, normals)) {
+            for (to, n) in self.normals.iter_mut().zip(normals.unwrap_or_default()) {
                 set(to, lane, n);
             }
+            if let Some(instance) = placed {
+                self.place(lane, instance);
+            }
             if mesh.mirrored {
-                let [u, v] = &mut self.reported;
-                std::mem::swap(&mut u[lane], &mut v[lane]);
+                self.rewind(lane);
             }
             block.paint(lane, palette.get(block.material[lane]));
         }
     }
 
-    /// Corners and normals of an instance in scene space.
+    /// Moves corners and normals of an instance to scene space.
     #[cold]
-    fn place(&mut self, lane: usize, i: &Instance, corners: [Vec3; 3], normals: [Vec3; 3]) -> ([Vec3; 3], [Vec3; 3]) {
-        let corners = corners.map(|p| i.to_scene.transform_point3(p.as_dvec3()).as_vec3());
-        self.rounding[lane] = i.rounding(corners[0]);
-        (corners, normals.map(|n| (i.normal_to_scene * n.as_dvec3()).normalize_or_zero().as_vec3()))
+    fn place(&mut self, lane: usize, instance: &Instance) {
+        for corner in &mut self.corners {
+            let p = instance.to_scene.transform_point3(DVec3::from_array(wide(corner, lane)));
+            set(corner, lane, p.as_vec3());
+        }
+        self.rounding[lane] = instance.rounding(Block::vec3(&self.corners[0], lane));
+        for normal in &mut self.normals {
+            let n = instance.normal_to_scene * DVec3::from_array(wide(normal, lane));
+            set(normal, lane, n.normalize_or_zero().as_vec3());
+        }
+    }
+
+    /// Lets corners two and three change places, where the placement mirrors space: the winding
+    /// again tells the outside.
+    #[cold]
+    fn rewind(&mut self, lane: usize) {
+        for of in [&mut self.corners, &mut self.normals] {
+            let [_, second, third] = of;
+            second.iter_mut().zip(third).for_each(|(a, b)| std::mem::swap(&mut a[lane], &mut b[lane]));
+        }
+        let [u, v] = &mut self.reported;
+        std::mem::swap(&mut u[lane], &mut v[lane]);
     }
 
     fn uv(&self, scene: &Scene, lane: usize) -> Option<Vec2> {
         let (mesh, _) = mesh_of(scene, self.geom[lane]);
-        let corners = wound(mesh, mesh.data.uvs_of(self.prim[lane])?);
-        Some((0..3).map(|c| corners[c] * self.weights[c][lane] as f32).sum())
+        let [a, b, c] = mesh.data.uvs_of(self.prim[lane])?;
+        let [b, c] = if mesh.mirrored { [c, b] } else { [b, c] };
+        let [wa, wb, wc] = [0, 1, 2].map(|corner| self.weights[corner][lane] as f32);
+        Some(a * wa + b * wb + c * wc)
     }
 }
 
@@ -158,10 +167,12 @@ impl Kernel for Finish<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let mut points = Points::EMPTY;
-        refine(self.facets, &mut points);
-        shading_normals(self.facets, &mut points);
+        // Apart from what is read: the loops are vector code only if nothing may overlap.
+        let (mut points, mut weights) = (Points::EMPTY, [[0.0; LANES]; 3]);
+        refine(self.facets, &mut points, &mut weights);
+        shading_normals(self.facets, &mut points, &weights);
         leave(&points, self.block);
+        self.facets.weights = weights;
     }
 }
 
@@ -188,7 +199,7 @@ fn cross(a: V, b: V) -> V {
 /// The steps of [`geom::triangle::refine`](crate::geom::triangle::refine) for all lanes, and the
 /// facet's normal turned to the ray.
 #[inline(always)]
-fn refine(f: &mut Facets, out: &mut Points) {
+fn refine(f: &Facets, out: &mut Points, weights: &mut [F64; 3]) {
     for i in 0..LANES {
         let (o, d) = (wide(&f.o, i), wide(&f.d, i));
         let p0 = wide(&f.corners[0], i);
@@ -213,9 +224,9 @@ fn refine(f: &mut Facets, out: &mut Points) {
         let unit = scale(ng, side / dot(ng, ng).sqrt());
         put(&mut out.p, i, p);
         put(&mut out.ng, i, unit);
-        f.weights[0][i] = 1.0 - u - v;
-        f.weights[1][i] = u;
-        f.weights[2][i] = v;
+        weights[0][i] = 1.0 - u - v;
+        weights[1][i] = u;
+        weights[2][i] = v;
         let e3 = sub(wide(&f.corners[2], i), wide(&f.corners[1], i));
         let size = |e: V| e[0].abs() + e[1].abs() + e[2].abs();
         out.extent[i] = size(e1).max(size(e2)).max(size(e3)) + f64::from(f.rounding[i]);
@@ -233,7 +244,7 @@ fn refine(f: &mut Facets, out: &mut Points) {
 ///
 /// Source of the lift: J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, ch. 4.
 #[inline(always)]
-fn shading_normals(f: &Facets, out: &mut Points) {
+fn shading_normals(f: &Facets, out: &mut Points, weights: &[F64; 3]) {
     if !f.smooth.contains(&true) {
         out.ns = out.ng;
         out.lifted = out.p;
@@ -245,7 +256,7 @@ fn shading_normals(f: &Facets, out: &mut Points) {
         let mut lift = [0.0; 3];
         for c in 0..3 {
             let n = scale(wide(&f.normals[c], i), out.side[i]);
-            let weight = f.weights[c][i];
+            let weight = weights[c][i];
             let below = dot(sub(p, wide(&f.corners[c], i)), n).min(0.0);
             for k in 0..3 {
                 sum[k] += weight * n[k];

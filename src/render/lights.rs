@@ -26,6 +26,8 @@ pub enum Target<'a> {
 pub struct Lit<'a> {
     /// Unoccluded share of the light for each lane.
     pub visible: &'a F32,
+    /// Vectors to the middle of the light, as the shadow rays have them.
+    pub to_light: &'a [F32; 3],
     /// Highlights are seen from this point; `None`: from where the ray came.
     pub seen_from: Option<DVec3>,
 }
@@ -53,11 +55,20 @@ pub fn add(block: &mut Block, light: &Light, lit: Lit<'_>) {
         Some(eye) => towards(block, eye),
     };
     // Nothing shines here: no power to take.
-    if block.specular.iter().flatten().all(|&s| s == 0.0) {
-        simd::run(Add::<false> { block, light, visible: lit.visible, view: &view });
-    } else {
-        simd::run(Add::<true> { block, light, visible: lit.visible, view: &view });
+    let shines = block.specular.iter().flatten().any(|&s| s != 0.0);
+    match (shines, light.falloff.is_some()) {
+        (false, false) => simd::run(Add::<false, false> { block, light, lit, view: &view }),
+        (false, true) => simd::run(Add::<false, true> { block, light, lit, view: &view }),
+        (true, false) => simd::run(Add::<true, false> { block, light, lit, view: &view }),
+        (true, true) => simd::run(Add::<true, true> { block, light, lit, view: &view }),
     }
+}
+
+/// Vectors from where shadow rays start to the middle of the light.
+#[must_use]
+pub fn to_center(block: &Block, light: &Light) -> [F32; 3] {
+    let l = light.position.to_array();
+    [0, 1, 2].map(|k| block.front[k].map(|from| (l[k] - f64::from(from)) as f32))
 }
 
 /// Unit vectors from the points of a block to one point.
@@ -115,31 +126,31 @@ impl<const POINTS: bool> Kernel for Aim<'_, POINTS> {
 ///
 /// Source: J. F. Blinn, "Models of Light Reflection for Computer Synthesized Pictures",
 /// SIGGRAPH 1977.
-struct Add<'a, const SPECULAR: bool> {
+struct Add<'a, const SPECULAR: bool, const FALLOFF: bool> {
     block: &'a mut Block,
     light: &'a Light,
-    visible: &'a F32,
+    lit: Lit<'a>,
     view: &'a [F32; 3],
 }
 
-impl<const SPECULAR: bool> Kernel for Add<'_, SPECULAR> {
+impl<const SPECULAR: bool, const FALLOFF: bool> Kernel for Add<'_, SPECULAR, FALLOFF> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let (b, l) = (self.block, self.light.position.to_array());
-        let falloff = self.light.falloff;
+        let (b, to_light) = (self.block, self.lit.to_light);
+        let falloff = self.light.falloff.map_or(0.0, |f| f as f32);
         let (mut diffuse, mut specular) = ([0f32; LANES], [0f32; LANES]);
         let mut strength = [0f32; LANES];
         let mut cos_h = [0f64; LANES];
         for i in 0..LANES {
-            let d = [0, 1, 2].map(|k| (l[k] - f64::from(b.front[k][i])) as f32);
+            let d = [to_light[0][i], to_light[1][i], to_light[2][i]];
             let square = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).max(f32::MIN_POSITIVE);
             let inv = 1.0 / square.sqrt();
             let n = [b.ns[0][i] as f32, b.ns[1][i] as f32, b.ns[2][i] as f32];
             // At the very place of a light that weakens from there, as good as infinite is enough.
-            let arrives = falloff.map_or(1.0, |f| 1.0 / (f as f32 * square).max(f32::MIN_POSITIVE));
-            strength[i] = self.visible[i] * arrives;
+            let arrives = if FALLOFF { 1.0 / (falloff * square).max(f32::MIN_POSITIVE) } else { 1.0 };
+            strength[i] = self.lit.visible[i] * arrives;
             diffuse[i] = strength[i] * ((n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) * inv).max(0.0);
             if SPECULAR {
                 let h = [0, 1, 2].map(|k| d[k] * inv + self.view[k][i]);
@@ -212,7 +223,8 @@ mod tests {
         let mut packet = RayPacket::EMPTY;
         aim(b, light, Target::Center, &mut packet);
         let before = Block::vec3(&b.color, 0);
-        add(b, light, Lit { visible: &unoccluded(&packet), seen_from });
+        let to_light = [packet.d_x, packet.d_y, packet.d_z];
+        add(b, light, Lit { visible: &unoccluded(&packet), to_light: &to_light, seen_from });
         Block::vec3(&b.color, 0) - before
     }
 

@@ -15,7 +15,7 @@ pub struct Paint {
     pub specular: Vec3,
     /// Blinn-Phong exponent.
     pub shininess: f32,
-    /// What a texel adds to the first three: the ambient light is in `ambient`.
+    /// What a texel adds to the first three: the ambient light and the emission are in `ambient`.
     pub texture: Option<Textured>,
 }
 
@@ -26,7 +26,7 @@ impl Paint {
             diffuse: m.diffuse,
             specular: m.specular,
             shininess: m.shininess,
-            texture: m.texture.map(|t| Textured { ambient: t.ambient * ambient, ..t }),
+            texture: m.texture.map(|t| Textured { ambient: t.ambient * ambient + t.emission, ..t }),
         }
     }
 }

@@ -302,7 +302,9 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         let light = self.lights[index];
         self.send_shadow_rays(|_, block, packet| lights::aim(block, &light, Target::Center, packet));
         for (packet, &i) in self.shadows.packets().iter().zip(&self.shadowed) {
-            let lit = Lit { visible: &lights::unoccluded(packet), seen_from: self.seen_from };
+            let to_light = [packet.d_x, packet.d_y, packet.d_z];
+            let visible = lights::unoccluded(packet);
+            let lit = Lit { visible: &visible, to_light: &to_light, seen_from: self.seen_from };
             lights::add(&mut self.blocks[i as usize], &light, lit);
         }
     }
@@ -332,7 +334,9 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         for (block, visible) in self.blocks[..self.used].iter_mut().zip(&self.visible) {
             if visible.iter().any(|&v| v > 0.0) {
                 let visible = visible.map(|v| v * share);
-                lights::add(block, &light, Lit { visible: &visible, seen_from: self.seen_from });
+                let to_light = lights::to_center(block, &light);
+                let lit = Lit { visible: &visible, to_light: &to_light, seen_from: self.seen_from };
+                lights::add(block, &light, lit);
             }
         }
     }

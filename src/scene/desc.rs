@@ -45,9 +45,9 @@ pub struct RenderDesc {
     pub min_weight: Option<f32>,
     /// Chooses the samples.
     pub seed: Option<u32>,
-    /// What is seen where nothing is hit, linear RGB.
+    /// What is seen where nothing is hit, linear RGB; black unless given.
     pub background: Option<[f64; 3]>,
-    /// Ambient light, linear RGB.
+    /// Ambient light, linear RGB; none unless given.
     pub ambient: Option<[f64; 3]>,
     /// Each camera ray passes within this many pixels of its pixel's centre, in x and y; half a
     /// pixel (the whole pixel) unless given.
@@ -55,7 +55,8 @@ pub struct RenderDesc {
     /// How lens points are drawn.
     pub lens_sampler: Option<LensSampler>,
     /// The rules of the course scenes: highlight towards the camera's position at every depth,
-    /// one index of refraction at every surface, output stretched to the range of the image.
+    /// one index of refraction at every surface, output stretched to the range of the image; bytes
+    /// of images are linear, and meshes count v downwards.
     pub course_rules: bool,
 }
 
@@ -244,6 +245,8 @@ pub enum ShapeDesc {
         path: PathBuf,
         /// Compute normals within this crease angle (degrees) where the file has none.
         smooth: Option<f64>,
+        /// Where the file is named.
+        place: Place,
     },
 }
 

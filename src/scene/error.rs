@@ -45,9 +45,9 @@ pub enum Error {
     },
     /// A file names another one outside the folders it may read from.
     #[error(
-        "{}:{line}: {} is outside the folder of the file that names it and is not read; \
-         copy it into that folder and name it there",
-        path.display(), target.display()
+        "{}:{line}: {} is outside the folder of the mesh that needs it and is not read; \
+         copy it into that folder and name it there, or allow its folder with --allow-path {}",
+        path.display(), target.display(), target.parent().unwrap_or(target).display()
     )]
     Forbidden {
         /// The file that names it.

@@ -2,11 +2,12 @@
 
 use super::desc::{NamedCamera, RenderDesc};
 use super::format::{Diagnostic, Override};
-use super::{Error, Material, Mesh, MeshData, MeshPaint, Object, Scene, Warning, obj, smooth};
-use crate::geom::TriangleMesh;
-use glam::Vec3;
+use super::freeze::{self, Assets, MeshFile, Wanted};
+use super::obj::Uv;
+use super::texture::Encoding;
+use super::{Error, MeshPaint, Object, Scene, Warning};
+use glam::{DAffine3, Vec3};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// How to read a scene.
@@ -43,54 +44,67 @@ pub struct Loaded {
     pub diagnostics: Vec<Diagnostic>,
     /// What was odd about files that it names, one per kind and file.
     pub warnings: Vec<Warning>,
+    /// What was not read because nothing uses it.
+    pub unused: Unused,
+    /// The scene or mesh file and all that it led to, but for the material libraries of meshes.
+    pub files: Vec<PathBuf>,
     /// Seconds spent on reading textures.
     pub texture_seconds: f64,
+}
+
+/// What a scene and the libraries of its meshes describe or name, but no picture of it needs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Unused {
+    /// Materials that no object has.
+    pub materials: usize,
+    /// Images that nothing samples.
+    pub textures: usize,
+    /// Lights that give no light.
+    pub lights: usize,
 }
 
 /// Colour seen where nothing is hit, for a mesh that says nothing about it.
 const BACKGROUND: Vec3 = Vec3::new(0.055, 0.065, 0.08);
 
-/// Reads the mesh in `path`.
+/// Reads the scene in `path`: a `.toml`, `.json` or `.ray` scene file, or an `.obj` by itself.
+/// What is no plain file and has no extension, a pipe, is taken for an `.obj`.
+///
+/// A scene file that says nothing about them has a black background and no ambient light.
 ///
 /// # Errors
 /// Whatever stops the scene from being rendered, with the place in the file.
 pub fn load(path: &Path, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
-    let read = obj::ReadOptions {
-        normals: true,
-        uv: false,
-        allow: &options.allow,
-        cancel: options.cancel,
-        progress: options.progress,
+    let meta = std::fs::metadata(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
+    if meta.is_dir() {
+        return Err(Error::NotAFile { path: path.to_owned() });
+    }
+    let bare = match path.extension() {
+        Some(extension) => extension.eq_ignore_ascii_case("obj"),
+        None => !meta.is_file(),
     };
-    let file = obj::read(path, &read)?;
-    let mut warnings = file.warnings;
-    let textured = file.materials.iter().filter(|m| m.map_kd.is_some()).count();
-    if textured > 0 {
-        let what =
-            format!("{textured} of its materials name a texture (map_Kd); textures are not read, Kd is used alone");
-        warnings.push(Warning::about(path, what));
+    if bare { load_mesh(path, options) } else { freeze::load(path, options) }
+}
+
+fn load_mesh(path: &Path, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
+    let mut assets = Assets::new(options, Encoding::Srgb);
+    let wanted = Wanted { uv: Uv::IfTextured, materials: true, v_down: false };
+    let file = MeshFile::read(path, wanted, &mut assets, options.progress)?;
+    assets.read_images_of_meshes(0)?;
+    let files = assets.files(Vec::new());
+    if options.smooth.is_some() && file.has_normals() {
+        let what = "the file has normals of its own: --smooth changes nothing";
+        assets.warnings.push(Warning::about(path, what.into()));
     }
-    let mesh = Arc::new(TriangleMesh::new(file.points, file.faces));
-    if mesh.bounds().is_empty() {
-        return Err(Error::NothingToHit { path: path.to_owned(), faces: mesh.face_count() });
-    }
-    let mut normals = file.normals;
-    if let Some(angle) = options.smooth {
-        if normals.is_some() {
-            warnings.push(Warning::about(path, "the file has normals of its own: --smooth changes nothing".into()));
-        } else {
-            normals = Some(smooth::crease_normals(&mesh, angle));
-        }
-    }
-    let data = MeshData { triangles: mesh, normals, uvs: file.uvs, face_materials: file.face_materials };
+    let Assets { images, warnings, unused, .. } = assets;
+    let (textures, numbers, texture_seconds) = images.finish();
     let scene = Scene {
         frame: file.frame,
-        objects: vec![Object::Mesh(Mesh { data: Arc::new(data), paint: MeshPaint::PerFace(0), mirrored: false })],
-        materials: file.materials.iter().map(Material::from).collect(),
+        materials: file.materials(&numbers).collect(),
+        objects: vec![Object::Mesh(file.into_mesh(&DAffine3::IDENTITY, options.smooth, MeshPaint::PerFace(0)))],
         lights: Vec::new(),
         ambient: Vec3::ZERO,
         background: BACKGROUND,
-        textures: Vec::new(),
+        textures,
         course_rules: false,
     };
     Ok(Loaded {
@@ -99,6 +113,8 @@ pub fn load(path: &Path, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
         cameras: Vec::new(),
         diagnostics: Vec::new(),
         warnings,
-        texture_seconds: 0.0,
+        unused,
+        files,
+        texture_seconds,
     })
 }

@@ -1,6 +1,5 @@
 //! Materials as shading reads them: every weight resolved to linear RGB.
 
-use super::obj::MtlMaterial;
 use glam::Vec3;
 
 /// How a surface answers light. All colours are linear RGB.
@@ -41,6 +40,8 @@ pub struct Textured {
     pub diffuse: Vec3,
     /// Adds to `specular`.
     pub specular: Vec3,
+    /// Adds to `emission`.
+    pub emission: Vec3,
 }
 
 /// Weight of the mirrored ray.
@@ -118,63 +119,6 @@ impl Material {
             // F + (1 - F): never more than the larger of the two.
             Reflect::Fresnel => self.refract.max_element().max(1.0),
             other => (other.upper_bound() + self.refract).max_element(),
-        }
-    }
-}
-
-impl From<&MtlMaterial> for Material {
-    /// What an MTL entry means here: `illum` decides which of its colours count.
-    fn from(m: &MtlMaterial) -> Self {
-        if *m == MtlMaterial::named(m.name.clone()) {
-            return Self { name: m.name.clone(), ..Self::default() };
-        }
-        let illum = m.illum.unwrap_or(if m.ks.is_some() { 2 } else { 1 });
-        let color = Vec3::from(m.kd.unwrap_or([0.75; 3]));
-        let ks = Vec3::from(m.ks.unwrap_or([0.0; 3]));
-        // Many exporters always write `Ka 1 1 1`.
-        let ambient = m.ka.filter(|&ka| ka != [1.0; 3]).map_or(color, Vec3::from);
-        let opacity = m.d.unwrap_or(1.0);
-        let roughness = m.pr.filter(|&r| r > 0.0);
-        let from_roughness = roughness.map(|r| (2.0 / (r * r * r * r) - 2.0).max(0.0));
-        let shiny = !matches!(illum, 0 | 1);
-        let metallic = m.pm.unwrap_or(0.0).clamp(0.0, 1.0);
-        let out = Self {
-            name: m.name.clone(),
-            ambient,
-            diffuse: color,
-            specular: if shiny { ks.lerp(ks * color, metallic) } else { Vec3::ZERO },
-            shininess: m.ns.or(from_roughness).unwrap_or(0.0).clamp(0.0, 1e6),
-            emission: Vec3::from(m.ke.unwrap_or([0.0; 3])),
-            reflect: match illum {
-                3 | 4 | 6 => Reflect::Constant(ks),
-                5 => Reflect::Metal(ks),
-                7 => Reflect::Fresnel,
-                _ => Reflect::NONE,
-            },
-            refract: Vec3::ZERO,
-            ior: f64::from(m.ni.unwrap_or(if matches!(illum, 6 | 7) { 1.5 } else { 1.0 })),
-            absorption: Vec3::ZERO,
-            texture: None,
-        };
-        let tint = Vec3::from(m.tf.unwrap_or([1.0; 3]));
-        match illum {
-            0 => Self {
-                emission: out.emission + color,
-                ambient: Vec3::ZERO,
-                diffuse: Vec3::ZERO,
-                specular: Vec3::ZERO,
-                ..out
-            },
-            4 | 6 | 7 | 9 => Self { refract: tint * m.d.map_or(1.0, |d| 1.0 - d), ..out },
-            // Plain alpha: what is not covered is seen through, unbent.
-            1 | 2 if opacity < 1.0 => Self {
-                ambient: out.ambient * opacity,
-                diffuse: out.diffuse * opacity,
-                refract: tint * (1.0 - opacity),
-                ior: 1.0,
-                ..out
-            },
-            _ => out,
         }
     }
 }

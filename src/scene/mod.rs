@@ -10,6 +10,7 @@ mod error;
 pub mod example;
 pub mod format;
 mod framing;
+mod freeze;
 mod light;
 mod load;
 mod material;
@@ -23,11 +24,11 @@ pub use camera::{Camera, CameraDesc, CameraRays, Projection};
 pub use error::{Error, Warning};
 pub use framing::{CameraOverrides, View};
 pub use light::Light;
-pub use load::{LoadOptions, Loaded, load};
+pub use load::{LoadOptions, Loaded, Unused, load};
 pub use material::{Material, Reflect, Textured};
 pub use needs::Needs;
 pub use object::{AnyShapes, Instance, Mesh, MeshData, MeshPaint, Object, Shapes};
-pub use texture::Texture;
+pub use texture::{Encoding, Texture};
 
 use crate::geom::{Bounds, ShapeSet};
 use crate::math::Frame;
@@ -137,6 +138,13 @@ impl Scene {
     #[must_use]
     pub fn stored_triangles(&self) -> usize {
         self.meshes().map(|m| m.triangles.face_count()).sum()
+    }
+
+    /// Analytic shapes of all classes.
+    #[must_use]
+    pub fn shapes(&self) -> usize {
+        let count = |o: &Object| if let Object::Shapes(s) = o { s.set.len() as usize } else { 0 };
+        self.objects.iter().map(count).sum()
     }
 
     /// Bytes of geometry, normals, texture coordinates, material indices and textures.

@@ -35,7 +35,8 @@ pub struct MeshData {
     pub triangles: Arc<TriangleMesh>,
     /// Normals at the corners; absent where the mesh is flat.
     pub normals: Option<CornerData>,
-    /// Texture coordinates at the corners; absent where nothing samples them.
+    /// Texture coordinates at the corners, v downwards as [`Texture::sample`](super::Texture::sample)
+    /// takes it; absent where nothing samples them.
     pub uvs: Option<CornerData>,
     /// Material of each triangle, counted within the mesh's file; absent where one serves all.
     pub face_materials: Option<Vec<u32>>,
@@ -206,15 +207,7 @@ impl Instance {
     /// Box around the placed box of the mesh.
     #[must_use]
     pub fn bounds(&self) -> Bounds {
-        let own = self.mesh.data.triangles.bounds();
-        if own.is_empty() {
-            return own;
-        }
-        let m = self.to_scene.matrix3;
-        let half = 0.5 * own.size();
-        let half = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z;
-        let center = self.to_scene.transform_point3(own.center());
-        Bounds { lo: center - half, hi: center + half }
+        self.mesh.data.triangles.bounds().under(&self.to_scene)
     }
 }
 

@@ -1,10 +1,10 @@
 //! Handles, memory, and every way in which no scene comes to be.
 
-use crate::{blob, build, device, grid, panic_of, rays};
+use crate::{OneByOne, Set, blob, build, device, grid, panic_of, rays};
 use glam::Vec3;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
-use tison::embree::{Device, DeviceConfig, Error, PrimHit, PrimSet, Scene, SceneBuilder, SceneOptions};
+use tison::embree::{Device, DeviceConfig, Error, Scene, SceneBuilder, SceneOptions};
 use tison::geom::{Bounds, Faults, Ray, TriangleMesh};
 
 #[test]
@@ -40,14 +40,14 @@ impl Drop for Counted {
     }
 }
 
-impl PrimSet for Counted {
+impl OneByOne for Counted {
     fn len(&self) -> u32 {
         3
     }
     fn bounds(&self, _: u32) -> Bounds {
         Bounds { lo: glam::DVec3::NEG_ONE, hi: glam::DVec3::ONE }
     }
-    fn hit(&self, _: u32, _: &Ray) -> Option<PrimHit> {
+    fn hit(&self, _: u32, _: &Ray) -> Option<f64> {
         None
     }
 }
@@ -58,7 +58,7 @@ fn each_set_of_shapes_is_dropped_once_and_after_its_scene() {
     let device = device();
     let mut builder = SceneBuilder::new(&device, SceneOptions::default()).unwrap();
     for id in 0..4 {
-        assert_eq!(builder.shapes(Arc::new(Counted(drops.clone()))).unwrap(), id);
+        assert_eq!(builder.shapes(Arc::new(Set(Counted(drops.clone())))).unwrap(), id);
     }
     let scene = builder.commit(None).unwrap();
     for ray in rays(50) {
@@ -74,7 +74,7 @@ fn each_set_of_shapes_is_dropped_once_and_after_its_scene() {
 fn a_builder_that_is_dropped_drops_its_shapes() {
     let drops = Arc::new(AtomicUsize::new(0));
     let mut builder = SceneBuilder::new(&device(), SceneOptions::default()).unwrap();
-    builder.shapes(Arc::new(Counted(drops.clone()))).unwrap();
+    builder.shapes(Arc::new(Set(Counted(drops.clone())))).unwrap();
     drop(builder);
     assert_eq!(drops.load(Relaxed), 1);
 }

@@ -2,14 +2,17 @@
 //! written in Rust. Clean under valgrind, which sees what Rust cannot: what the C library reads and writes.
 #![cfg(feature = "embree")]
 
+mod backend;
+mod instances;
 mod lifecycle;
 mod rays;
 mod shapes;
+mod user;
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use std::sync::Arc;
-use tison::embree::{Device, DeviceConfig, PrimHit, PrimSet, Scene, SceneBuilder, SceneOptions};
-use tison::geom::{Bounds, Ray, TriangleMesh};
+use tison::embree::{Device, DeviceConfig, PrimSet, Scene, SceneBuilder, SceneOptions};
+use tison::geom::{Bounds, Lanes, Ray, TriangleMesh};
 
 fn device() -> Device {
     Device::new(&DeviceConfig { threads: 2, ..Default::default() }).unwrap()
@@ -81,26 +84,30 @@ fn rays(n: usize) -> Vec<Ray> {
     (0..n).map(|_| numbers.ray()).collect()
 }
 
-/// Spheres in f64.
-struct Spheres(Vec<(DVec3, f64)>);
+/// A set that is written for one ray at a time.
+trait OneByOne: Send + Sync + 'static {
+    fn len(&self) -> u32;
+    fn bounds(&self, prim: u32) -> Bounds;
+    /// Parameter of the nearest hit in the open interval.
+    fn hit(&self, prim: u32, ray: &Ray) -> Option<f64>;
+}
 
-impl PrimSet for Spheres {
+/// Any of them, for Embree.
+struct Set<S>(S);
+
+impl<S: OneByOne> PrimSet for Set<S> {
     fn len(&self) -> u32 {
-        self.0.len() as u32
+        self.0.len()
     }
-
     fn bounds(&self, prim: u32) -> Bounds {
-        let (center, radius) = self.0[prim as usize];
-        Bounds { lo: center - radius, hi: center + radius }
+        self.0.bounds(prim)
     }
-
-    fn hit(&self, prim: u32, ray: &Ray) -> Option<PrimHit> {
-        let (center, radius) = self.0[prim as usize];
-        let (o, d) = (ray.o.as_dvec3() - center, ray.d.as_dvec3());
-        let closest = -o.dot(d) / d.length_squared();
-        let half = (radius * radius - (o + closest * d).length_squared()) / d.length_squared();
-        let t = [closest - half.sqrt(), closest + half.sqrt()].into_iter().find(|&t| t > f64::from(ray.t_near))?;
-        Some(PrimHit { t: t as f32, u: 0.25, v: 0.5, ng: ((o + t * d) / radius).as_vec3() })
+    fn hit_lanes<const N: usize>(&self, prim: u32, rays: &Lanes<'_, f32, N>) -> Option<[f64; N]> {
+        Some(std::array::from_fn(|i| {
+            let [o, d] = [rays.o, rays.d].map(|axes| Vec3::from(axes.map(|axis| axis[i])));
+            let ray = Ray { o, d, t_near: rays.t_near[i], t_far: rays.t_far[i] };
+            self.0.hit(prim, &ray).unwrap_or(f64::INFINITY)
+        }))
     }
 }
 

@@ -140,7 +140,8 @@ fn flat_boxes_are_hit_in_their_plane_and_at_their_border() {
         cubes.push(Cube::new(at + 2.0 * DVec3::Z, DVec3::splat(0.5)).expect("a cube"));
     }
     let [quads, cubes] = [AnyShapes::Quads(Arc::new(quads)), AnyShapes::Cubes(Arc::new(cubes))].map(shapes);
-    for (objects, z) in [(&[quads.clone()][..], 2.0), (&[cubes.clone()], 3.5), (&[cubes, quads], 2.0)] {
+    let both = [cubes, quads];
+    for (objects, z) in [(&both[1..], 2.0), (&both[..1], 3.5), (&both[..], 2.0)] {
         let native = build(objects);
         for (x, y) in (-1..16).flat_map(|x| (-1..16).map(move |y| (0.5 * x as f32, 0.5 * y as f32))) {
             for zero in [0.0, -0.0] {

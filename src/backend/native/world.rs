@@ -85,8 +85,8 @@ impl World {
         const NONE: Waiting = (0.0, Child::NONE);
         match self.stack_len {
             0 => false,
-            len if len <= SMALL_STACK => walk.descend::<ANY, Self>(self, Child::ROOT, &mut [NONE; SMALL_STACK]),
-            len if len <= STACK => walk.descend::<ANY, Self>(self, Child::ROOT, &mut [NONE; STACK]),
+            1..=SMALL_STACK => walk.descend::<ANY, Self>(self, Child::ROOT, &mut [NONE; SMALL_STACK]),
+            n if n <= STACK => walk.descend::<ANY, Self>(self, Child::ROOT, &mut [NONE; STACK]),
             _ => walk.descend::<ANY, Self>(self, Child::ROOT, &mut [NONE; 2 * STACK]),
         }
     }

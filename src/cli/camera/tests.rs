@@ -7,7 +7,7 @@ use std::sync::Arc;
 use tison::geom::TriangleMesh;
 use tison::math::Frame;
 use tison::scene::desc::RenderDesc;
-use tison::scene::{Material, Mesh, MeshData, MeshPaint, Object, Scene};
+use tison::scene::{Material, Mesh, MeshData, MeshPaint, Object, Scene, Unused};
 
 const MAIN: CameraDesc = CameraDesc {
     eye: DVec3::new(0.0, 2.0, 8.0),
@@ -45,7 +45,16 @@ fn loaded(cameras: &[(&str, CameraDesc)]) -> Loaded {
     };
     let cameras = cameras.iter().map(|&(name, camera)| NamedCamera { name: name.into(), camera }).collect();
     let render = RenderDesc { size: Some((640, 512)), ..RenderDesc::default() };
-    Loaded { scene, render, cameras, diagnostics: vec![], warnings: vec![], texture_seconds: 0.0 }
+    Loaded {
+        scene,
+        render,
+        cameras,
+        diagnostics: vec![],
+        warnings: vec![],
+        unused: Unused::default(),
+        files: vec![],
+        texture_seconds: 0.0,
+    }
 }
 
 fn try_choose(flags: &str, loaded: &Loaded) -> Result<Chosen, Failure> {

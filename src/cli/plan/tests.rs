@@ -109,6 +109,7 @@ fn what_cannot_be_is_refused() {
         ("a.obj --fov 30 --ortho 2", "cannot be used with"),
         ("a.obj --camera front --eye 1,2,3", "cannot be used with"),
         ("a.obj -D render.samples=4", "a.obj is none"),
+        ("a.toml --allow-path /no/such/folder", "no such folder"),
         ("a.toml -D render.samples", "path.to.key=value"),
         ("a.obj --pixel 1,1 --exposure 1", "cannot be used with"),
         ("a.obj --print-config --pixel 1,1", "cannot be used with"),

@@ -273,6 +273,25 @@ impl Source {
         Place { file: self.index, line: clip(number), column: clip(column) }
     }
 
+    /// The bytes of the word at a line and column: what is in quotes or brackets there as far as the line
+    /// goes, or up to the next blank.
+    pub fn word_at(&self, line: u32, column: u32) -> Range<usize> {
+        let line = (line as usize).clamp(1, self.lines.len());
+        let (_, body) = self.line(self.lines[line - 1]);
+        let rest = &self.text[body.clone()];
+        let skipped = (column as usize).saturating_sub(1);
+        let start = rest.char_indices().nth(skipped).map_or(rest.len(), |(i, _)| i);
+        let word = &rest[start..];
+        let length = match word.chars().next() {
+            Some(quote @ ('"' | '\'')) => word[1..].find(quote).map(|i| i + 2),
+            Some('[') => word.rfind(']').map(|i| i + 1),
+            Some('{') => word.rfind('}').map(|i| i + 1),
+            _ => word.find(char::is_whitespace),
+        };
+        let start = body.start + start;
+        start..start + length.unwrap_or(word.len())
+    }
+
     fn chars_before(&self, at: usize) -> usize {
         let Some(known) = self.chars.get(at / STEP) else { return at };
         known + starts(&self.text.as_bytes()[at / STEP * STEP..at])
@@ -334,6 +353,26 @@ error: no material is called `gld`
         let shown = Diagnostic::error(source(&text).spot(start..start + 3), "wrong").render(Look::Plain);
         assert!(shown.contains("scene.toml:1:102003"), "{shown}");
         assert!(shown.contains("^^^") && shown.len() < 600, "{shown}");
+    }
+
+    #[test]
+    fn the_word_at_a_place() {
+        let s = source("a = 1\né [[object]] \"a b.obj\" x\n\tMesh 'c' {a = {}} # }\n\"open");
+        let word = |line, column| &s.text[s.word_at(line, column)];
+        for (line, column, want) in [
+            (2, 3, "[[object]]"),
+            (2, 14, "\"a b.obj\""),
+            (2, 24, "x"),
+            (3, 2, "Mesh"),
+            (3, 7, "'c'"),
+            (3, 11, "{a = {}} # }"),
+            (4, 1, "\"open"),
+            (2, 99, ""),
+            (99, 1, "\"open"),
+            (0, 0, "a"),
+        ] {
+            assert_eq!(word(line, column), want, "{line}:{column}");
+        }
     }
 
     #[test]

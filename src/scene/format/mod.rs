@@ -10,6 +10,7 @@ mod diagnostic;
 mod include;
 mod json;
 mod material;
+mod mistakes;
 mod model;
 mod object;
 mod overrides;
@@ -22,10 +23,11 @@ mod write;
 
 pub use assets::{AssetError, resolve_asset};
 pub use diagnostic::{Diagnostic, Look, Severity};
+pub(super) use mistakes::Mistakes;
 pub use overrides::Override;
 pub use write::to_toml;
 
-use super::desc::SceneDesc;
+use super::desc::{SceneDesc, ShapeDesc};
 use diagnostic::Source;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -68,6 +70,14 @@ impl Format {
 /// What is wrong with it, in the order of places: at most 20 mistakes, then perhaps a note of how
 /// many there are more.
 pub fn parse(path: &Path, text: &[u8], options: &ReadOptions) -> Result<(SceneDesc, Vec<Diagnostic>), Vec<Diagnostic>> {
+    parse_keeping(path, text, options).map(|(desc, warnings, _)| (desc, warnings))
+}
+
+/// A scene, warnings, and where mistakes are told that turn up later.
+type Parsed = (SceneDesc, Vec<Diagnostic>, Mistakes);
+
+/// [`parse`], with the text kept to show mistakes in.
+pub(super) fn parse_keeping(path: &Path, text: &[u8], options: &ReadOptions) -> Result<Parsed, Vec<Diagnostic>> {
     let mut ctx = Context::default();
     let format = Format::of(path);
     let source = decode(&mut ctx, path, text, format);
@@ -90,7 +100,7 @@ pub fn parse(path: &Path, text: &[u8], options: &ReadOptions) -> Result<(SceneDe
             }
         }
     }
-    ctx.finish().map(|warnings| (desc, warnings))
+    ctx.finish().map(|warnings| (desc, warnings, Mistakes::new(ctx)))
 }
 
 /// Takes the text in. Only a `.ray` may have bytes that are not UTF-8: old comments.
@@ -141,6 +151,9 @@ fn override_desc(ctx: &mut Context, desc: SceneDesc, options: &ReadOptions) -> S
     }
     for (new, old) in out.objects.iter_mut().zip(&desc.objects) {
         new.place = old.place;
+        if let (ShapeDesc::Mesh { place: new, .. }, ShapeDesc::Mesh { place: old, .. }) = (&mut new.shape, &old.shape) {
+            *new = *old;
+        }
     }
     out
 }

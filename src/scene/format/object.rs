@@ -78,7 +78,8 @@ impl Reader<'_> {
         let file = t.req("mesh", "the name of a file: mesh = \"model.obj\"");
         let path = file.and_then(|f| path(self.ctx, &f, "the name of a mesh file"));
         let smooth = t.opt("smooth").map_or(Some(None), smooth);
-        Some(ShapeDesc::Mesh { path: path?, smooth: smooth? })
+        let place = place(self.ctx, file?.node.span);
+        Some(ShapeDesc::Mesh { path: path?, smooth: smooth?, place })
     }
 
     fn material(&self, f: Field<'_>) -> Option<String> {

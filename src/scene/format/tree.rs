@@ -1,6 +1,7 @@
 //! Values with their places: what TOML and JSON have in common.
 
 use super::diagnostic::{Diagnostic, Source, Spot};
+use crate::scene::desc::Place;
 use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -99,6 +100,12 @@ impl Context {
         self.sources.iter().map(|s| s.path.clone()).collect()
     }
 
+    /// The word at a place that was told by one of the files.
+    pub fn word_at(&self, place: Place) -> Span {
+        let range = self.source(place.file).word_at(place.line, place.column);
+        Span { file: place.file, start: range.start, end: range.end }
+    }
+
     pub fn spot(&self, span: Span) -> Spot {
         self.source(span.file).spot(span.start..span.end)
     }
@@ -135,9 +142,9 @@ impl Context {
         !self.reports.borrow().errors.is_empty()
     }
 
-    /// The warnings, or the first mistakes in the order of their places.
-    pub fn finish(self) -> Result<Vec<Diagnostic>, Vec<Diagnostic>> {
-        let Reports { mut errors, mut warnings, dropped } = self.reports.into_inner();
+    /// The warnings, or the first mistakes in the order of their places; none are kept.
+    pub fn finish(&self) -> Result<Vec<Diagnostic>, Vec<Diagnostic>> {
+        let Reports { mut errors, mut warnings, dropped } = self.reports.take();
         if errors.is_empty() {
             warnings.sort_by_key(Diagnostic::order);
             return Ok(warnings);

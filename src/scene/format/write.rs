@@ -157,7 +157,7 @@ impl Writer {
                 self.text("shape", "quad");
                 self.key("half", half);
             }
-            ShapeDesc::Mesh { path, smooth } => {
+            ShapeDesc::Mesh { path, smooth, .. } => {
                 self.path("mesh", path);
                 self.opt("smooth", *smooth);
             }

@@ -1,7 +1,7 @@
 //! Which triangle has which material, and where the materials are described.
 
 use super::super::{Error, Warning};
-use super::mtl::{self, Library, MtlMaterial};
+use super::mtl::{self, Entry, Library, MtlMaterial};
 use super::notes::with_more;
 use super::survey::{Survey, Tally};
 use super::{excerpt, text, trimmed, unquoted};
@@ -81,11 +81,14 @@ pub(super) struct Described {
     pub(super) materials: Vec<MtlMaterial>,
     /// Described, but no triangle has them.
     pub(super) unused: usize,
+    /// Images that only those name.
+    pub(super) unused_images: usize,
     pub(super) warnings: Vec<Warning>,
 }
 
-/// Reads what `names` need from the libraries that `obj` names. A library that is missing
-/// or a material that none describes is a warning and a default grey.
+/// Reads what `names` need from the libraries that `obj` names, and finds the images that those
+/// materials name. A library or image that is missing, or a material that none describes, is a
+/// warning, and a default grey or the colour alone.
 pub(super) fn describe(
     names: &[Box<[u8]>],
     statements: &[LibraryStatement],
@@ -94,21 +97,19 @@ pub(super) fn describe(
 ) -> Result<Described, Error> {
     let mut out = Described::default();
     // Faces that name no material need no library.
-    let mut libraries = Vec::new();
+    let (mut finder, mut libraries) = (Finder::new(obj, allow), Vec::new());
     if names.iter().any(|n| !n.is_empty()) {
-        libraries = Finder::new(obj, allow).read_all(statements, &mut out.warnings)?;
+        libraries = finder.read_all(statements, &mut out.warnings)?;
     }
-    let mut described: BTreeMap<&[u8], &MtlMaterial> = BTreeMap::new();
-    for (name, material) in libraries.iter().flat_map(|l: &Library| &l.materials) {
+    let mut described: BTreeMap<&[u8], (&Library, &Entry)> = BTreeMap::new();
+    for (library, entry) in libraries.iter().flat_map(|l: &Library| l.entries.iter().map(move |e| (l, e))) {
         // The first library that has a name is the one that counts.
-        described.entry(name).or_insert(material);
+        described.entry(&entry.name).or_insert((library, entry));
     }
-    let used: BTreeSet<&[u8]> = names.iter().map(|n| &**n).collect();
-    out.unused = described.keys().filter(|n| !used.contains(**n)).count();
-    let mut missing = Vec::new();
+    let (mut missing, mut images) = (Vec::new(), Images::default());
     for name in names {
-        out.materials.push(match described.get(&**name) {
-            Some(&material) => material.clone(),
+        out.materials.push(match described.remove(&**name) {
+            Some((library, entry)) => images.find(&finder, library, entry)?,
             None if name.is_empty() => MtlMaterial::default(),
             None => {
                 missing.push(name);
@@ -116,10 +117,14 @@ pub(super) fn describe(
             }
         });
     }
+    out.unused = described.len();
+    let unused = described.values().filter_map(|(_, e)| e.material.map_kd.as_deref());
+    out.unused_images = unused.filter(|image| !images.wanted.contains(*image)).collect::<BTreeSet<_>>().len();
     if let Some(first) = missing.first() {
         let what = format!("material '{}' is not in any library: shown in grey", excerpt(first));
         out.warnings.push(Warning::about(obj, with_more(what, missing.len() as u64)));
     }
+    out.warnings.extend(images.warning());
     if names.is_empty() {
         out.materials.push(MtlMaterial::default());
     }
@@ -127,7 +132,35 @@ pub(super) fn describe(
     Ok(out)
 }
 
-/// Finds libraries, but only in the folders that may be read.
+/// Images that materials in use name.
+#[derive(Default)]
+struct Images {
+    /// As written, below the library's folder.
+    wanted: BTreeSet<PathBuf>,
+    /// The first that is not there, and how many those are.
+    missing: Option<(Warning, u64)>,
+}
+
+impl Images {
+    /// The material of `entry` with the path of its image, if it has one that is there.
+    fn find(&mut self, finder: &Finder<'_>, library: &Library, entry: &Entry) -> Result<MtlMaterial, Error> {
+        let mut material = entry.material.clone();
+        let Some(written) = material.map_kd.take() else { return Ok(material) };
+        material.map_kd = finder.image(&written, library, entry.map_line)?;
+        if self.wanted.insert(written.clone()) && material.map_kd.is_none() {
+            let what = format!("image '{}' is not there: Kd is used alone", written.display());
+            let first = || (Warning::at(&library.path, entry.map_line, what), 0);
+            self.missing.get_or_insert_with(first).1 += 1;
+        }
+        Ok(material)
+    }
+
+    fn warning(self) -> Option<Warning> {
+        self.missing.map(|(first, count)| Warning { what: with_more(first.what, count), ..first })
+    }
+}
+
+/// Finds libraries and images, but only in the folders that may be read.
 struct Finder<'a> {
     obj: &'a Path,
     folder: PathBuf,
@@ -168,24 +201,30 @@ impl<'a> Finder<'a> {
         Ok(libraries)
     }
 
-    /// The file that `name` means, links resolved: as written, or with slashes for
-    /// backslashes, or next to the OBJ under its last name.
+    /// The file that `name` means: as written, or with slashes for backslashes, or next to the OBJ
+    /// under its last name.
     fn find(&self, name: &[u8], line: u64) -> Result<Option<PathBuf>, Error> {
         let written = text(name);
         let slashed = written.replace('\\', "/");
         let last = slashed.rsplit('/').next().unwrap_or_default().to_owned();
-        for candidate in [written, slashed, last] {
-            let candidate = self.folder.join(candidate);
-            let Ok(target) = candidate.canonicalize() else { continue };
-            if !target.is_file() {
-                continue;
-            }
-            if self.allowed.iter().any(|folder| target.starts_with(folder)) {
-                return Ok(Some(target));
-            }
-            return Err(Error::Forbidden { path: self.obj.to_owned(), line, target });
+        let candidates = [written, slashed, last].map(|name| self.folder.join(name));
+        self.first_file(&candidates).map_err(|target| Error::Forbidden { path: self.obj.to_owned(), line, target })
+    }
+
+    /// The file of the image `written` on `line` of `library`, or the one of its name next to that.
+    fn image(&self, written: &Path, library: &Library, line: u64) -> Result<Option<PathBuf>, Error> {
+        let beside = written.file_name().map(|name| library.path.with_file_name(name));
+        let candidates: Vec<_> = std::iter::once(written.to_owned()).chain(beside).collect();
+        self.first_file(&candidates).map_err(|target| Error::Forbidden { path: library.path.clone(), line, target })
+    }
+
+    /// The first of `candidates` that is a file, links resolved. An error, if that may not be read.
+    fn first_file(&self, candidates: &[PathBuf]) -> Result<Option<PathBuf>, PathBuf> {
+        let files = candidates.iter().filter_map(|c| c.canonicalize().ok()).find(|target| target.is_file());
+        match files {
+            Some(target) if !self.allowed.iter().any(|folder| target.starts_with(folder)) => Err(target),
+            found => Ok(found),
         }
-        Ok(None)
     }
 
     /// Reads a library, unless it was read before.

@@ -38,8 +38,10 @@ pub struct ReadOptions<'a> {
     /// Whether normals are wanted. What is not wanted is checked but not stored.
     pub normals: bool,
     /// Whether texture coordinates are wanted.
-    pub uv: bool,
-    /// Folders, besides the file's own, below which material libraries may be read.
+    pub uv: Uv,
+    /// Whether the file's own materials are wanted. If not, no library is read and every face has none.
+    pub materials: bool,
+    /// Folders, besides the file's own, below which libraries and their images may be.
     pub allow: &'a [PathBuf],
     /// Reading stops soon after this becomes true.
     pub cancel: &'a AtomicBool,
@@ -48,10 +50,22 @@ pub struct ReadOptions<'a> {
     pub progress: Option<&'a (dyn Fn(u64, u64) + Sync)>,
 }
 
+/// When to keep the texture coordinates of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Uv {
+    /// Never: nothing samples an image there.
+    Never,
+    /// If a material of its own, in use on it, has an image.
+    IfTextured,
+    /// Whenever the file has any.
+    Always,
+}
+
 impl std::fmt::Debug for ReadOptions<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let mut f = f.debug_struct("ReadOptions");
-        f.field("normals", &self.normals).field("uv", &self.uv).field("allow", &self.allow).finish_non_exhaustive()
+        f.field("normals", &self.normals).field("uv", &self.uv).field("materials", &self.materials);
+        f.field("allow", &self.allow).finish_non_exhaustive()
     }
 }
 
@@ -67,11 +81,11 @@ pub struct ObjFile {
     pub faces: Vec<[u32; 3]>,
     /// Normals, of unit length or zero; absent where no face has any or none are wanted.
     pub normals: Option<CornerData>,
-    /// Texture coordinates, likewise.
+    /// Texture coordinates as written, v upwards, likewise.
     pub uvs: Option<CornerData>,
     /// Material of each triangle, an index into `materials`; absent if one serves all.
     pub face_materials: Option<Vec<u32>>,
-    /// The materials that faces have, in order of first use; at least one.
+    /// The materials that faces have, in order of first use; at least one if they are wanted.
     pub materials: Vec<MtlMaterial>,
     /// What was in the file.
     pub counts: Counts,
@@ -106,6 +120,8 @@ pub struct Counts {
     pub points: u64,
     /// Materials that the libraries describe and no face has.
     pub unused_materials: u64,
+    /// Images that only those name.
+    pub unused_images: u64,
 }
 
 /// Reads the OBJ file at `path` and the libraries it names.
@@ -113,7 +129,7 @@ pub struct Counts {
 /// # Errors
 /// [`Error::Read`] and [`Error::NotAFile`] for what is no readable file, [`Error::At`] for
 /// the first line that cannot be understood, [`Error::NoFaces`] for a file with nothing to
-/// render, [`Error::Forbidden`] for a library outside the allowed folders,
+/// render, [`Error::Forbidden`] for a library or image outside the allowed folders,
 /// [`Error::TooMany`] beyond what 32-bit indices can count, [`Error::Cancelled`].
 pub fn read(path: &Path, options: &ReadOptions<'_>) -> Result<ObjFile, Error> {
     /// Small enough for a second-level cache, large enough to make each piece's own cost vanish.

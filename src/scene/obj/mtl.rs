@@ -35,8 +35,8 @@ pub struct MtlMaterial {
     pub pm: Option<f32>,
     /// `Pr`: roughness, 0 to 1.
     pub pr: Option<f32>,
-    /// `map_Kd`: the image, options left out; relative ones are joined to the folder of
-    /// the library. Whether it may be read is for the one who reads it to judge.
+    /// `map_Kd`: the image, options left out, as a path without links; absent as well where
+    /// there is no such file. It lies in a folder that may be read.
     pub map_kd: Option<PathBuf>,
 }
 
@@ -69,11 +69,21 @@ impl MtlMaterial {
     }
 }
 
-/// A library: materials by name, in the order of the file.
+/// A library: materials in the order of the file.
 #[derive(Debug, Default)]
 pub(super) struct Library {
-    pub(super) materials: Vec<(Box<[u8]>, MtlMaterial)>,
+    pub(super) path: PathBuf,
+    pub(super) entries: Vec<Entry>,
     pub(super) warnings: Vec<Warning>,
+}
+
+/// A material of a library. Its image is still as written, joined to the library's folder.
+#[derive(Debug)]
+pub(super) struct Entry {
+    pub(super) name: Box<[u8]>,
+    pub(super) material: MtlMaterial,
+    /// Line of its `map_Kd`.
+    pub(super) map_line: u64,
 }
 
 /// Statements that are read, in the spelling of the format.
@@ -109,7 +119,8 @@ const UNUSED: [&str; 24] = [
 
 /// Reads the text of the library at `path`.
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Library {
-    let mut reader = Reader { path, out: Library::default(), tr: None, oddities: BTreeMap::new() };
+    let out = Library { path: path.to_owned(), ..Library::default() };
+    let mut reader = Reader { path, out, tr: None, oddities: BTreeMap::new() };
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     for (i, line) in bytes.split(|&c| c == b'\n').enumerate() {
         let line = trimmed(line);
@@ -148,8 +159,9 @@ impl Reader<'_> {
             if name.is_empty() {
                 self.odd(number, "'newmtl' without a name".into());
             }
-            self.out.materials.push((name.into(), MtlMaterial::named(text(name))));
-        } else if self.out.materials.is_empty() {
+            let material = MtlMaterial::named(text(name));
+            self.out.entries.push(Entry { name: name.into(), material, map_line: 0 });
+        } else if self.out.entries.is_empty() {
             self.odd(number, format!("'{keyword}' before the first 'newmtl': skipped"));
         } else if keyword == "map_Kd" {
             self.texture(rest, number);
@@ -161,7 +173,7 @@ impl Reader<'_> {
 
     /// Stores what `keyword` says; `None` if it cannot be read.
     fn value(&mut self, keyword: &str, rest: &[u8]) -> Option<()> {
-        let m = &mut self.out.materials.last_mut()?.1;
+        let m = &mut self.out.entries.last_mut()?.material;
         match keyword {
             "Ka" => m.ka = Some(color(rest)?),
             "Kd" => m.kd = Some(color(rest)?),
@@ -190,15 +202,16 @@ impl Reader<'_> {
             return self.odd(number, "'map_Kd' without a file name: skipped".into());
         }
         let folder = self.path.parent().unwrap_or(Path::new(""));
-        if let Some((_, m)) = self.out.materials.last_mut() {
-            m.map_kd = Some(folder.join(name));
+        if let Some(entry) = self.out.entries.last_mut() {
+            entry.material.map_kd = Some(folder.join(name));
+            entry.map_line = number;
         }
     }
 
     /// The current material is complete.
     fn close(&mut self) {
         let tr = self.tr.take();
-        if let Some((_, m)) = self.out.materials.last_mut() {
+        if let Some(Entry { material: m, .. }) = self.out.entries.last_mut() {
             m.d = m.d.or(tr.map(|tr| 1.0 - tr));
         }
     }
@@ -299,8 +312,8 @@ mod tests {
 
     fn only(text: &str) -> MtlMaterial {
         let library = read(text);
-        assert_eq!(library.materials.len(), 1);
-        library.materials[0].1.clone()
+        assert_eq!(library.entries.len(), 1);
+        library.entries[0].material.clone()
     }
 
     #[test]
@@ -335,7 +348,7 @@ mod tests {
         assert_eq!(only("newmtl a\nTr 0.25\nd 0.5").d, Some(0.5));
         assert_eq!(only("newmtl a\nd -halo 0.5").d, Some(0.5));
         let two = read("newmtl a\nTr 0.25\nnewmtl b\n");
-        assert_eq!((two.materials[0].1.d, two.materials[1].1.d), (Some(0.75), None));
+        assert_eq!((two.entries[0].material.d, two.entries[1].material.d), (Some(0.75), None));
     }
 
     #[test]
@@ -348,7 +361,7 @@ mod tests {
             ("/abs/a.png", "/abs/a.png"),
         ] {
             let library = read(&format!("newmtl a\nmap_Kd {written}\n"));
-            assert_eq!(library.materials[0].1.map_kd, Some(want.into()), "{written}");
+            assert_eq!(library.entries[0].material.map_kd, Some(want.into()), "{written}");
             assert_eq!(library.warnings.len(), usize::from(written.starts_with('-')), "{written}");
         }
     }
@@ -357,7 +370,7 @@ mod tests {
     fn what_cannot_be_read_is_skipped_and_told_once() {
         let library =
             read("Kd 1\nnewmtl a\nKd 1 2\nKd x\nKd nan\nKd 1 2 3 4\nNs\nillum 2.5\nfoo\nfoo\nnorm a\nkd 0.5\n");
-        assert_eq!(library.materials[0].1, MtlMaterial { kd: Some([0.5; 3]), ..MtlMaterial::named("a".into()) });
+        assert_eq!(library.entries[0].material, MtlMaterial { kd: Some([0.5; 3]), ..MtlMaterial::named("a".into()) });
         let told: Vec<_> = library.warnings.iter().map(ToString::to_string).collect();
         assert_eq!(
             told,

@@ -1,14 +1,14 @@
 //! Puts the passes together.
 
 use super::super::{Error, Warning};
-use super::materials::{LibraryStatement, Runs, describe};
+use super::materials::{Described, LibraryStatement, Runs, describe};
 use super::notes::{Kind, Notes};
 use super::parse::{self, Parsed, Plan, Target, Usage};
 use super::pieces::Pieces;
 use super::polygon;
 use super::source::Source;
 use super::survey::{self, Sampling, Survey, Tally, cut, running_totals};
-use super::{CornerData, Counts, ObjFile, ReadOptions};
+use super::{CornerData, Counts, ObjFile, ReadOptions, Uv};
 use crate::math::Frame;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -26,11 +26,18 @@ pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Re
         .each(jobs, &[], |i, (), text, joined| Ok(survey::survey(text, pieces.ranges[i].start, joined, sampling)))?;
     let (before, total) = running_totals(&surveys);
     check_size(&total, &pieces)?;
+    // Before anything is parsed: whether an image is sampled decides what is stored.
+    let materials = Materials::of(&pieces, &surveys, &before, &total)?;
+    let uv_wanted = match options.uv {
+        Uv::Never => false,
+        Uv::IfTextured => materials.described.materials.iter().any(|m| m.map_kd.is_some()),
+        Uv::Always => true,
+    };
     let plan = Plan {
         frame: Frame::fit(&sampling.merge(surveys.iter())),
         total,
         normals: options.normals && total.normals > 0,
-        uv: options.uv && total.textures > 0,
+        uv: uv_wanted && total.textures > 0,
     };
 
     let mut arrays = Arrays::new(&plan);
@@ -51,8 +58,7 @@ pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Re
         let (line, _) = pieces.place(note.offset, &surveys)?;
         warnings.push(Warning::at(&source.path, line, note.message()));
     }
-    let runs = Runs::join(&surveys, &before, total.triangles);
-    let described = describe(&runs.names, &statements(&pieces, &surveys)?, &source.path, options.allow)?;
+    let Materials { runs, described } = materials;
     warnings.extend(described.warnings);
     Ok(ObjFile {
         frame,
@@ -62,9 +68,32 @@ pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Re
         points: arrays.points,
         faces: arrays.faces,
         materials: described.materials,
-        counts: Counts { unused_materials: described.unused as u64, ..counts },
+        counts: Counts {
+            unused_materials: described.unused as u64,
+            unused_images: described.unused_images as u64,
+            ..counts
+        },
         warnings,
     })
+}
+
+/// Which triangles have which materials, and what is said about those.
+#[derive(Default)]
+struct Materials {
+    runs: Runs,
+    described: Described,
+}
+
+impl Materials {
+    fn of(pieces: &Pieces<'_>, surveys: &[Survey], before: &[Tally], total: &Tally) -> Result<Self, Error> {
+        if !pieces.options.materials {
+            return Ok(Self::default());
+        }
+        let runs = Runs::join(surveys, before, total.triangles);
+        let statements = statements(pieces, surveys)?;
+        let described = describe(&runs.names, &statements, &pieces.source.path, pieces.options.allow)?;
+        Ok(Self { runs, described })
+    }
 }
 
 /// The arrays that the second pass fills.
@@ -304,6 +333,7 @@ fn counts(total: &Tally, clipped: u64, notes: &Notes) -> Counts {
         polylines: notes.count(Kind::Polyline),
         points: notes.count(Kind::PointElement),
         unused_materials: 0,
+        unused_images: 0,
     }
 }
 

@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 static GO_ON: AtomicBool = AtomicBool::new(false);
 
 fn options() -> ReadOptions<'static> {
-    ReadOptions { normals: true, uv: true, allow: &[], cancel: &GO_ON, progress: None }
+    ReadOptions { normals: true, uv: Uv::Always, materials: true, allow: &[], cancel: &GO_ON, progress: None }
 }
 
 fn parse_in(bytes: &[u8], piece: u64) -> Result<ObjFile, Error> {
@@ -190,7 +190,7 @@ fn indices_that_are_those_of_the_vertices_are_not_stored() {
 #[test]
 fn what_is_not_wanted_is_not_stored_but_checked() {
     let text = format!("{V}vn 0 0 1\nvt 0 0\nf 1/1/1 2/1/1 3/1/1\n");
-    let wanted = ReadOptions { normals: false, uv: false, ..options() };
+    let wanted = ReadOptions { normals: false, uv: Uv::Never, ..options() };
     let source = Source::memory(Path::new("a.obj"), text.as_bytes());
     let file = read::read(&source, &wanted, 64).expect("the text is fine");
     assert!(file.normals.is_none() && file.uvs.is_none());

@@ -257,7 +257,7 @@ impl<'c> Builder<'c> {
             self.error(file.at, "a mesh without a file", "the name of an .obj file");
             return;
         }
-        let shape = ShapeDesc::Mesh { path: file.value.into(), smooth: None };
+        let shape = ShapeDesc::Mesh { path: file.value.into(), smooth: None, place: self.place(file.at) };
         self.object(at, shape, material, DMat4::IDENTITY);
     }
 
