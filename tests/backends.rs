@@ -14,11 +14,19 @@ use tison::math::Frame;
 use tison::scene::{AnyShapes, Instance, Material, Mesh, MeshData, MeshPaint, Object, Scene, Shapes};
 use tison::with_shapes;
 
-/// What a scene is made of here: all that both backends draw.
-const KINDS: &[Kind] = &[Kind::Mesh];
+/// What a scene is made of here: all that there is.
+const KINDS: &[Kind] = &[
+    Kind::Mesh,
+    Kind::Placed,
+    Kind::Spheres,
+    Kind::Cubes,
+    Kind::PlacedSpheres,
+    Kind::PlacedCubes,
+    Kind::Cylinders,
+    Kind::Quads,
+];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(dead_code, reason = "Embree's backend draws meshes only")]
 enum Kind {
     Mesh,
     Placed,

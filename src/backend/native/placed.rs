@@ -1,6 +1,7 @@
 //! Meshes in a space of their own.
 
 use super::bvh::Bvh;
+use super::ray::Line;
 use super::traverse::{Space, Waiting, Walk};
 use crate::geom::{ShapeError, cofactors, invert};
 use glam::{DAffine3, DMat3, DVec3};
@@ -23,11 +24,12 @@ impl Placed {
         Ok(Self { mesh, inverse: invert(to_scene)?, translation: to_scene.translation, normals })
     }
 
-    /// The ray in the mesh's own space. Subtraction first, so that nothing cancels far from the
-    /// origin; not normalised, so that `t` is the same number in both spaces.
+    /// The ray in the mesh's own space, up to the best hit so far. Subtraction first, so that nothing
+    /// cancels far from the origin; not normalised, so that `t` is the same number in both spaces.
     #[inline]
-    pub(super) fn local_ray(&self, o: DVec3, d: DVec3) -> (DVec3, DVec3) {
-        (self.inverse * (o - self.translation), self.inverse * d)
+    pub(super) fn local(&self, walk: &Walk) -> Option<Walk> {
+        let Line { o, d, .. } = walk.line;
+        Walk::placed(&Line { o: self.inverse * (o - self.translation), d: self.inverse * d, ..walk.line })
     }
 
     /// A triangle's normal in scene space: that of its moved corners, as they are wound.
@@ -39,8 +41,6 @@ impl Placed {
 impl Space for Bvh {
     const PLACED: bool = true;
 
-    type Tools = ();
-
     #[inline]
     fn bvh(&self) -> &Bvh {
         self
@@ -50,17 +50,5 @@ impl Space for Bvh {
     #[inline]
     fn apart<const ANY: bool>(&self, _: &mut Walk, _: usize, _: &mut [Waiting]) -> bool {
         false
-    }
-
-    #[inline]
-    fn apart_together<const ANY: bool>(
-        &self,
-        _: usize,
-        _: u32,
-        _: &mut [Option<Walk>],
-        _: &mut [Waiting],
-        (): &mut (),
-    ) -> u32 {
-        0
     }
 }

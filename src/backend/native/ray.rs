@@ -41,31 +41,44 @@ pub(super) struct BoxRay4 {
     t_near: Vec4,
 }
 
+/// A ray in f64, as it is decided about.
+#[derive(Clone, Copy)]
+pub(super) struct Line {
+    pub(super) o: DVec3,
+    pub(super) d: DVec3,
+    /// Start of the open interval, which holds the `t` whose f32 lies in the ray's.
+    pub(super) t_near: f64,
+    /// End of it; shrinks as hits are found.
+    pub(super) t_far: f64,
+}
+
 /// A ray as triangles see it.
 pub(super) struct TriangleRay {
-    /// For the test in f64. Its interval holds the `t` whose f32 lies in the ray's.
+    /// For the test in f64.
     pub(super) exact: ShearedRay,
     /// Origin in the order of the sheared axes.
     o: [f32; 3],
     shear: [f32; 2],
-    /// What the rounding of the origin moves sheared coordinates by, at most.
+    /// What the rounding of an origin moves sheared coordinates by, at most.
     off: f32,
 }
 
 /// Prepares `ray`; `None` where it meets nothing because it has no direction, is not finite
 /// or ends before it begins.
 #[inline(always)]
-pub(super) fn prepare(ray: &Ray) -> Option<(BoxRay, TriangleRay)> {
+pub(super) fn prepare(ray: &Ray) -> Option<(BoxRay, Line)> {
     let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
     let unit = unit(o, d).filter(|_| ray.t_near < ray.t_far)?;
     let (t_near, t_far) = interval(ray);
     let boxes = BoxRay::new(ray.o, (d * (1.0 / unit)).as_vec3(), t_near, unit);
-    Some((boxes, TriangleRay::new(ray.o, ShearedRay::new(o, d, t_near, t_far), 0.0)))
+    Some((boxes, Line { o, d, t_near, t_far }))
 }
 
-/// The same for a ray in the space of a placed mesh and the `t` between two; `None` as well for one
-/// that starts beyond f32, where the mesh is a speck.
-pub(super) fn prepare_placed(o: DVec3, d: DVec3, t_near: f64, t_far: f64) -> Option<(BoxRay, TriangleRay)> {
+/// The same for a ray in the space of a placed mesh; `None` as well for one that starts beyond f32,
+/// where the mesh is a speck.
+#[inline(always)]
+pub(super) fn prepare_placed(line: &Line) -> Option<(BoxRay, Line)> {
+    let Line { o, d, t_near, .. } = *line;
     let unit = unit(o, d)?;
     // What is shorter cannot move a hit, and its reciprocal would not fit.
     let scaled = d * (1.0 / unit);
@@ -74,10 +87,7 @@ pub(super) fn prepare_placed(o: DVec3, d: DVec3, t_near: f64, t_far: f64) -> Opt
     if !near.is_finite() {
         return None;
     }
-    let boxes = BoxRay::new(near, scaled.as_vec3(), t_near, unit);
-    // Half an ulp of x or y and as much of z, sheared; twice that, as for the other bounds.
-    let off = near.abs().max_element() * (2.0 * f32::EPSILON);
-    Some((boxes, TriangleRay::new(near, ShearedRay::new(o, scaled * unit, t_near, t_far), off)))
+    Some((BoxRay::new(near, scaled.as_vec3(), t_near, unit), Line { d: scaled * unit, ..*line }))
 }
 
 /// The power of two at or below the largest component of `d`: scaling by it is exact. `None`
@@ -147,7 +157,11 @@ impl BoxRay4 {
 }
 
 impl TriangleRay {
-    fn new(o: Vec3, exact: ShearedRay, off: f32) -> Self {
+    pub(super) fn new(line: &Line) -> Self {
+        let exact = ShearedRay::new(line.o, line.d, line.t_near, line.t_far);
+        let o = line.o.as_vec3();
+        // Half an ulp of x or y and as much of z, sheared; twice that, as for the other bounds.
+        let off = o.abs().max_element() * (2.0 * f32::EPSILON);
         Self { exact, o: exact.axes().map(|axis| o[axis]), shear: exact.shear().map(|s| s as f32), off }
     }
 
@@ -209,7 +223,8 @@ mod tests {
             let target = t[0].lerp(t[1], s) + beside * 10f32.powi(off);
             let ray = Ray::new(o * unit, target - o);
             prop_assume!(ray.d != Vec3::ZERO);
-            let (_, triangles) = prepare(&ray).expect("finite");
+            let (_, line) = prepare(&ray).expect("finite");
+            let triangles = TriangleRay::new(&line);
             let mut block = Block::EMPTY;
             let corners = t.map(|p| p * unit);
             block.set(2, corners, 7);
@@ -228,7 +243,8 @@ mod tests {
         }
         for lane in 0..4 {
             let ray = Ray::new(Vec3::new(lane as f32 + 0.3, 0.3, 0.0), Vec3::Z);
-            let (_, triangles) = prepare(&ray).expect("finite");
+            let (_, line) = prepare(&ray).expect("finite");
+            let triangles = TriangleRay::new(&line);
             assert_eq!(triangles.candidates::<World>(&block), 1 << lane);
         }
     }

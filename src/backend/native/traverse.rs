@@ -1,7 +1,7 @@
 //! The way of one ray through a hierarchy.
 
 use super::bvh::{Block, Bvh, Child, MAX_DEPTH, WIDTH};
-use super::ray::{BoxRay, BoxRay4, TriangleRay, prepare, prepare_placed};
+use super::ray::{BoxRay, BoxRay4, Line, TriangleRay, prepare, prepare_placed};
 use crate::geom::Ray;
 use crate::geom::triangle::{self, TriangleHit};
 use glam::{DVec3, Vec3};
@@ -20,24 +20,11 @@ pub(super) trait Space {
     /// Whether rays come from another space, so that their origins are rounded to f32.
     const PLACED: bool;
 
-    /// What packets need to test things that have leaves to themselves.
-    type Tools;
-
     fn bvh(&self) -> &Bvh;
 
     /// Tests `apart[index]` of the hierarchy; whether it is the best hit now. `stack` is free
     /// to use.
     fn apart<const ANY: bool>(&self, walk: &mut Walk, index: usize, stack: &mut [Waiting]) -> bool;
-
-    /// The same for the rays of `lanes`: bits of those for which it is the best hit now.
-    fn apart_together<const ANY: bool>(
-        &self,
-        index: usize,
-        lanes: u32,
-        walks: &mut [Option<Walk>],
-        stack: &mut [Waiting],
-        tools: &mut Self::Tools,
-    ) -> u32;
 }
 
 /// The best hit so far.
@@ -74,9 +61,9 @@ impl Slot {
 /// A ray on its way.
 pub(super) struct Walk {
     pub(super) boxes: BoxRay,
-    triangles: TriangleRay,
-    /// Direction as given.
-    d: Vec3,
+    pub(super) line: Line,
+    /// Made for the first triangles that the ray comes by.
+    triangles: Option<TriangleRay>,
     best: Option<Best>,
     /// The `t`, as boxes count it, from where on nothing matters.
     pub(super) cull: f32,
@@ -86,32 +73,19 @@ impl Walk {
     /// `None` for a ray that meets nothing whatever there is.
     #[inline(always)]
     pub(super) fn new(ray: &Ray) -> Option<Self> {
-        Some(Self::prepared(prepare(ray)?, ray.d))
+        prepare(ray).map(Self::prepared)
     }
 
-    /// The ray from `o` along `d` in the space of a placed mesh, up to the best hit so far.
-    #[inline]
-    pub(super) fn placed(&self, o: DVec3, d: DVec3) -> Option<Self> {
-        let (t_near, t_far) = self.interval();
-        Some(Self::prepared(prepare_placed(o, d, t_near, t_far)?, Vec3::ZERO))
+    /// The same for a ray in the space of a placed mesh.
+    #[inline(always)]
+    pub(super) fn placed(line: &Line) -> Option<Self> {
+        prepare_placed(line).map(Self::prepared)
     }
 
     #[inline(always)]
-    fn prepared((boxes, triangles): (BoxRay, TriangleRay), d: Vec3) -> Self {
-        let cull = boxes.cull(triangles.exact.t_far);
-        Self { boxes, triangles, d, best: None, cull }
-    }
-
-    /// Origin and direction of a ray in the scene.
-    #[inline]
-    pub(super) fn ray(&self) -> (DVec3, DVec3) {
-        (Vec3::from(self.boxes.o).as_dvec3(), self.d.as_dvec3())
-    }
-
-    /// The open interval of `t` that is left.
-    #[inline]
-    pub(super) fn interval(&self) -> (f64, f64) {
-        (self.triangles.exact.t_near, self.triangles.exact.t_far)
+    fn prepared((boxes, line): (BoxRay, Line)) -> Self {
+        let cull = boxes.cull(line.t_far);
+        Self { boxes, line, triangles: None, best: None, cull }
     }
 
     /// The best hit.
@@ -123,19 +97,11 @@ impl Walk {
     /// Takes a hit inside the interval if it is better; whether it was.
     #[inline]
     pub(super) fn offer(&mut self, hit: Best) -> bool {
-        let better = self.keep(hit);
-        if better {
-            self.cull = self.boxes.cull(self.triangles.exact.t_far);
-        }
-        better
-    }
-
-    #[inline]
-    fn keep(&mut self, hit: Best) -> bool {
         let better = self.best.is_none_or(|b| hit.hit.t < b.hit.t || hit.id < b.id);
         if better {
             // Just past it, so that an equal `t` with a lower number still passes.
-            self.triangles.exact.t_far = hit.hit.t.next_up();
+            self.line.t_far = hit.hit.t.next_up();
+            self.cull = self.boxes.cull(self.line.t_far);
             self.best = Some(hit);
         }
         better
@@ -188,21 +154,24 @@ impl Walk {
 
     #[inline(always)]
     fn block<S: Space>(&mut self, block: &Block, index: usize, lanes: u32) -> bool {
-        let mut lanes = self.triangles.candidates::<S>(block) & lanes;
+        let mut lanes = self.triangle_ray().candidates::<S>(block) & lanes;
         let mut better = false;
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % WIDTH;
             lanes &= lanes - 1;
-            let exact = &self.triangles.exact;
-            let Some(hit) = triangle::intersect_permuted(exact, block.permuted(lane, exact.axes())) else {
-                continue;
-            };
-            better |= self.keep(Best { hit, id: block.id[lane], at: Slot(index as u32, lane as u32) });
-        }
-        if better {
-            self.cull = self.boxes.cull(self.triangles.exact.t_far);
+            let t_far = self.line.t_far;
+            let exact = &mut self.triangle_ray().exact;
+            exact.t_far = t_far;
+            if let Some(hit) = triangle::intersect_permuted(exact, block.permuted(lane, exact.axes())) {
+                better |= self.offer(Best { hit, id: block.id[lane], at: Slot(index as u32, lane as u32) });
+            }
         }
         better
+    }
+
+    #[inline(always)]
+    fn triangle_ray(&mut self) -> &mut TriangleRay {
+        self.triangles.get_or_insert_with(|| TriangleRay::new(&self.line))
     }
 }
 

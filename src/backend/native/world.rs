@@ -2,12 +2,12 @@
 
 use super::build::{Source, build, numbers, owner};
 use super::bvh::{Apart, Bvh, Child};
-use super::packet::{Tools, bits};
 use super::placed::Placed;
+use super::ray::Line;
 use super::traverse::{Best, SMALL_STACK, STACK, Slot, Space, Waiting, Walk};
 use super::{BuildError, BuildOptions};
 use crate::geom::triangle::TriangleHit;
-use crate::geom::{Coherence, Hit, Ray, ShapeSet};
+use crate::geom::{Hit, Ray, ShapeSet};
 use crate::scene::{AnyShapes, MeshData, Object};
 use crate::with_shapes;
 use core::fmt;
@@ -91,6 +91,14 @@ impl World {
         }
     }
 
+    /// The shape in a leaf, if there is one in it.
+    #[inline]
+    pub(super) fn shape(&self, leaf: Child) -> Option<Shape<'_>> {
+        let Apart { object, prim } = self.bvh.apart[self.bvh.apart_index(leaf)?];
+        let Thing::Shapes(set) = &self.things[object as usize] else { return None };
+        Some(Shape { set, prim, id: self.first[object as usize] + prim })
+    }
+
     /// The best hit as it is reported.
     pub(super) fn hit(&self, best: &Best) -> Hit {
         let (geom_id, prim_id) = owner(&self.first, best.id);
@@ -108,10 +116,24 @@ impl World {
     }
 }
 
+/// A shape of the scene.
+pub(super) struct Shape<'a> {
+    pub(super) set: &'a AnyShapes,
+    /// Its number in the set.
+    pub(super) prim: u32,
+    /// Its number in the scene.
+    id: u32,
+}
+
+impl Shape<'_> {
+    /// A hit at `t`; the rest is for who refines it.
+    pub(super) fn hit(&self, t: f64) -> Best {
+        Best { hit: TriangleHit { t, u: 0.0, v: 0.0 }, id: self.id, at: Slot::NONE }
+    }
+}
+
 impl Space for World {
     const PLACED: bool = false;
-
-    type Tools = Tools;
 
     #[inline]
     fn bvh(&self) -> &Bvh {
@@ -121,71 +143,21 @@ impl Space for World {
     fn apart<const ANY: bool>(&self, walk: &mut Walk, index: usize, stack: &mut [Waiting]) -> bool {
         let Apart { object, prim } = self.bvh.apart[index];
         let id = self.first[object as usize] + prim;
-        let (o, d) = walk.ray();
         match &self.things[object as usize] {
             Thing::Mesh => false,
             Thing::Shapes(set) => {
-                let (t_near, t_far) = walk.interval();
+                let Line { o, d, t_near, t_far } = walk.line;
                 let t = with_shapes!(set, set => set.hit(prim, o, d, t_near, t_far));
-                t.is_some_and(|t| walk.offer(shape_hit(t, id)))
+                t.is_some_and(|t| walk.offer(Shape { set, prim, id }.hit(t)))
             }
             Thing::Placed(placed) => {
                 let mesh = &self.meshes[placed.mesh as usize];
-                let (o, d) = placed.local_ray(o, d);
-                let Some(mut local) = walk.placed(o, d) else { return false };
+                let Some(mut local) = placed.local(walk) else { return false };
                 local.descend::<ANY, Bvh>(mesh, Child::ROOT, stack);
                 local.best().is_some_and(|&best| walk.offer(Best { id, ..best }))
             }
         }
     }
-
-    fn apart_together<const ANY: bool>(
-        &self,
-        index: usize,
-        lanes: u32,
-        walks: &mut [Option<Walk>],
-        stack: &mut [Waiting],
-        tools: &mut Tools,
-    ) -> u32 {
-        let Apart { object, prim } = self.bvh.apart[index];
-        let id = self.first[object as usize] + prim;
-        let mut met = 0;
-        let mut offer = |lane: usize, walk: &mut Option<Walk>, hit: Best| {
-            met |= u32::from(walk.as_mut().is_some_and(|walk| walk.offer(hit))) << lane;
-        };
-        match &self.things[object as usize] {
-            Thing::Mesh => {}
-            Thing::Shapes(set) => {
-                if let Some(t) = tools.wide.hit(set, prim, lanes, walks) {
-                    for lane in bits(lanes).filter(|&lane| t[lane] < f64::INFINITY) {
-                        offer(lane, &mut walks[lane], shape_hit(t[lane], id));
-                    }
-                }
-            }
-            Thing::Placed(placed) => {
-                let mesh = &self.meshes[placed.mesh as usize];
-                let local = |lane: usize| {
-                    let walk = walks[lane].as_ref().filter(|_| lanes >> lane & 1 == 1)?;
-                    let (o, d) = walk.ray();
-                    let (o, d) = placed.local_ray(o, d);
-                    walk.placed(o, d)
-                };
-                tools.placed.walks.clear();
-                tools.placed.walks.extend((0..walks.len()).map(local));
-                tools.placed.trace::<ANY, Bvh>(mesh, Coherence::Coherent, stack, &mut ());
-                for lane in bits(lanes) {
-                    if let Some(&best) = tools.placed.walks[lane].as_ref().and_then(Walk::best) {
-                        offer(lane, &mut walks[lane], Best { id, ..best });
-                    }
-                }
-            }
-        }
-        met
-    }
-}
-
-fn shape_hit(t: f64, id: u32) -> Best {
-    Best { hit: TriangleHit { t, u: 0.0, v: 0.0 }, id, at: Slot::NONE }
 }
 
 fn source(object: &Object) -> Source<'_> {
