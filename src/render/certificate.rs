@@ -1,6 +1,6 @@
 //! How much light the branches that are not traced can carry.
 
-use crate::scene::{Light, Needs, Scene};
+use crate::scene::{Light, Needs, Scene, Textured};
 use glam::Vec3;
 
 /// Bounds on what one ray can bring back, by how many bounces it may still make.
@@ -35,11 +35,13 @@ impl Radiance {
         let background = scene.background.max_element();
         let (mut local, mut rho) = (0f32, 0f32);
         for m in &scene.materials {
-            // A texel is at most white, N·L and N·H are at most 1.
-            let white = |f: fn(&crate::scene::Textured) -> Vec3| m.texture.as_ref().map_or(Vec3::ZERO, f);
-            let ambient = m.ambient + white(|t| t.ambient);
-            let lit = m.diffuse + m.specular + white(|t| t.diffuse + t.specular);
-            let emission = m.emission + white(|t| t.emission);
+            // N·L and N·H are at most 1.
+            let most = |f: fn(&Textured) -> Vec3| {
+                m.texture.as_ref().map_or(Vec3::ZERO, |t| f(t) * scene.textures[t.image as usize].brightest())
+            };
+            let ambient = m.ambient + most(|t| t.ambient);
+            let lit = m.diffuse + m.specular + most(|t| t.diffuse + t.specular);
+            let emission = m.emission + most(|t| t.emission);
             let at_hit = emission + ambient * scene.ambient + lights.unwrap_or(Vec3::ZERO) * lit;
             local = local.max(at_hit.max_element());
             rho = rho.max(m.passed_on());

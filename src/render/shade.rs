@@ -4,7 +4,7 @@ use super::contacts::Contacts;
 use super::media::{Media, Medium};
 use super::optics::{self, Refraction};
 use super::surface::SurfacePoint;
-use crate::scene::{Material, Reflect, Scene};
+use crate::scene::{AnyShapes, Material, Object, Reflect, Scene};
 use glam::{DVec3, Vec3};
 
 /// A ray that goes on from a hit.
@@ -39,8 +39,10 @@ pub fn onward(
 ) -> Onward {
     let material = &scene.materials[point.material];
     let dense = material.refracts() || material.reflect == Reflect::Fresnel;
-    // What neither bends nor absorbs fills no space: a sheet with holes, say.
-    let fills = material.ior != 1.0 || material.absorption != Vec3::ZERO;
+    // What neither bends nor absorbs fills no space: a sheet with holes, say. A ball or box of
+    // it is a bubble in what the ray is in.
+    let bubble = medium != Medium::OUTSIDE && is_closed(scene, point.id);
+    let fills = material.ior != 1.0 || material.absorption != Vec3::ZERO || bubble;
     if scene.course_rules {
         let (reflected, refracted) = branches(material, point, d, 1.0 / material.ior, optics::refract_as_course);
         return Onward { reflected, refracted, behind: medium };
@@ -59,6 +61,16 @@ pub fn onward(
     };
     let (reflected, refracted) = branches(material, point, d, eta, optics::refract);
     Onward { reflected, refracted, behind }
+}
+
+/// Whether the surface is known to enclose a space.
+fn is_closed(scene: &Scene, [object, _]: [u32; 2]) -> bool {
+    let Object::Shapes(shapes) = &scene.objects[object as usize] else { return false };
+    match shapes.set {
+        AnyShapes::Spheres(_) | AnyShapes::PlacedSpheres(_) | AnyShapes::Cubes(_) | AnyShapes::PlacedCubes(_) => true,
+        // Open ones are among them.
+        AnyShapes::Cylinders(_) | AnyShapes::Quads(_) => false,
+    }
 }
 
 /// The mirrored and the refracted branch of a hit; `d` is the unit direction of the ray, `eta`

@@ -107,6 +107,15 @@ impl Texture {
         above.lerp(below, down)
     }
 
+    /// Largest component of any texel; 1 for bytes, whichever there are.
+    #[must_use]
+    pub fn brightest(&self) -> f32 {
+        match &self.texels {
+            Texels::Bytes(..) => 1.0,
+            Texels::Floats(all) => all.iter().copied().fold(0.0, f32::max),
+        }
+    }
+
     #[inline]
     fn texel(&self, x: usize, y: usize) -> Vec3 {
         let at = 3 * (y * self.width as usize + x);

@@ -175,3 +175,10 @@ fn broken_and_huge_files_are_refused_in_words() {
         assert!(said.contains(want), "{said}");
     }
 }
+
+#[test]
+fn the_brightest_texel_bounds_what_a_surface_can_answer() {
+    let bytes = Texture::from_bytes((1, 1), vec![3, 2, 1], Encoding::Linear, true);
+    let floats = Texture::from_floats((2, 1), vec![0.1, 0.2, 0.3, 7.5, 0.0, 1.0], false);
+    assert_eq!((bytes.brightest(), floats.brightest()), (1.0, 7.5));
+}
