@@ -106,8 +106,8 @@ fn normals(loaded: &Loaded, object: usize) -> Vec<DVec3> {
     };
     let of = data.normals.as_ref().expect("it has normals");
     let numbers = (0..data.triangles.face_count()).map(|t| of.of(data.triangles.faces(), t));
-    let three = numbers.flat_map(|n| data.normals_at(n).expect("all corners have one"));
-    three.map(|n| (matrix * n.as_dvec3()).normalize()).collect()
+    let three = numbers.flat_map(|n| of.three::<3>(n).expect("all corners have one"));
+    three.map(|n| (matrix * DVec3::from(n.map(f64::from))).normalize()).collect()
 }
 
 #[track_caller]

@@ -140,12 +140,31 @@ impl Block {
 
     /// Gives `lane` the colours of a material.
     #[inline]
-    pub fn paint(&mut self, lane: usize, paint: &Paint) {
+    fn paint(&mut self, lane: usize, paint: &Paint) {
         self.shininess[lane] = paint.shininess;
         for axis in 0..3 {
             self.diffuse[axis][lane] = paint.diffuse[axis];
             self.specular[axis][lane] = paint.specular[axis];
             self.color[axis][lane] = paint.own[axis];
+        }
+    }
+
+    /// Gives all lanes in use the colours of their materials.
+    pub fn paint_all(&mut self, palette: &Palette) {
+        let first = self.material[0];
+        if self.material[..self.len].iter().all(|&m| m == first) {
+            // Neighbours mostly show one material.
+            let paint = palette.get(first);
+            self.shininess = [paint.shininess; LANES];
+            for axis in 0..3 {
+                self.diffuse[axis] = [paint.diffuse[axis]; LANES];
+                self.specular[axis] = [paint.specular[axis]; LANES];
+                self.color[axis] = [paint.own[axis]; LANES];
+            }
+            return;
+        }
+        for lane in 0..self.len {
+            self.paint(lane, palette.get(self.material[lane]));
         }
     }
 
@@ -161,7 +180,7 @@ impl Block {
         let palette = Palette::of(scene);
         match &scene.objects[hit.geom_id as usize] {
             Object::Shapes(_) => Self::finish_one(ShapeHits::default(), scene, &packet, &mut block, &palette),
-            _ => Self::finish_one(Facets::EMPTY, scene, &packet, &mut block, &palette),
+            _ => Self::finish_one(Facets::new(scene), scene, &packet, &mut block, &palette),
         }
         block
     }
@@ -190,6 +209,9 @@ impl Block {
 pub trait Hits {
     /// Takes over ray and hit `from` of `packet`.
     fn set(&mut self, lane: usize, packet: &RayHitPacket, from: usize);
+
+    /// Takes over all rays and hits of `packet`.
+    fn set_all(&mut self, packet: &RayHitPacket);
 
     /// Makes the first `len` of them into the points of `block`, and gives them their colours.
     fn finish(&mut self, len: usize, scene: &Scene, palette: &Palette, block: &mut Block);

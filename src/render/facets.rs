@@ -4,15 +4,16 @@
 
 use super::block::{Block, F32, F64, Hits, Points, V, get, leave, put, wide};
 use super::paint::Palette;
-use crate::geom::{LANES, RayHitPacket};
-use crate::scene::{Instance, Mesh, Object, Scene};
+use crate::geom::{LANES, RayHitPacket, TriangleMesh};
+use crate::scene::obj::CornerData;
+use crate::scene::{Instance, Mesh, MeshPaint, Object, Scene};
 use crate::simd::{self, Kernel};
 use glam::{DVec3, Vec2, Vec3};
 
 /// What hits of triangles are computed from.
 #[repr(align(64))]
 #[derive(Debug)]
-pub struct Facets {
+pub struct Facets<'a> {
     o: [F32; 3],
     d: [F32; 3],
     reported: [F32; 2],
@@ -26,15 +27,38 @@ pub struct Facets {
     weights: [F64; 3],
     geom: [u32; LANES],
     prim: [u32; LANES],
+    /// Of each object; `None` for shapes.
+    meshes: Vec<Option<Buffers<'a>>>,
 }
 
-/// The mesh of object `geom`, and its placement if it is an instance.
-#[inline]
-fn mesh_of(scene: &Scene, geom: u32) -> (&Mesh, Option<&Instance>) {
-    match &scene.objects[geom as usize] {
-        Object::Mesh(mesh) => (mesh, None),
-        Object::Instance(instance) => (&instance.mesh, Some(instance)),
-        Object::Shapes(_) => unreachable!("hits of shapes are collected apart"),
+/// Where everything about the triangles of an object is: nothing has to be followed for it.
+#[derive(Clone, Copy, Debug)]
+struct Buffers<'a> {
+    triangles: &'a TriangleMesh,
+    normals: Option<(&'a [[u32; 3]], &'a CornerData)>,
+    materials: Option<&'a [u32]>,
+    /// Material that those are counted from.
+    first_material: u32,
+    mesh: &'a Mesh,
+    placed: Option<&'a Instance>,
+}
+
+impl<'a> Buffers<'a> {
+    fn of(object: &'a Object) -> Option<Self> {
+        let mesh = object.mesh()?;
+        let data = &*mesh.data;
+        let (first_material, materials) = match mesh.paint {
+            MeshPaint::One(material) => (material, None),
+            MeshPaint::PerFace(first) => (first, data.face_materials.as_deref()),
+        };
+        Some(Self {
+            triangles: &data.triangles,
+            normals: data.normals.as_ref().map(|n| (n.indices.as_deref().unwrap_or(data.triangles.faces()), n)),
+            materials,
+            first_material,
+            mesh,
+            placed: if let Object::Instance(instance) = object { Some(instance) } else { None },
+        })
     }
 }
 
@@ -45,56 +69,73 @@ fn set(to: &mut [F32; 3], lane: usize, v: Vec3) {
     to[2][lane] = v.z;
 }
 
-impl Facets {
+impl<'a> Facets<'a> {
+    /// For hits of the meshes of `scene`.
+    #[must_use]
+    pub fn new(scene: &'a Scene) -> Self {
+        Self::over(scene.objects.iter().map(Buffers::of).collect())
+    }
+
     /// A good hit in every lane: lanes that no hit fills give numbers all the same, and a
     /// packet with a NaN in it is slow to trace.
-    pub const EMPTY: Self = Self {
-        o: [[0.25; LANES], [0.25; LANES], [1.0; LANES]],
-        d: [[0.0; LANES], [0.0; LANES], [-1.0; LANES]],
-        reported: [[0.25; LANES]; 2],
-        corners: [
-            [[0.0; LANES]; 3],
-            [[1.0; LANES], [0.0; LANES], [0.0; LANES]],
-            [[0.0; LANES], [1.0; LANES], [0.0; LANES]],
-        ],
-        normals: [[[0.0; LANES]; 3]; 3],
-        smooth: [false; LANES],
-        rounding: [0.0; LANES],
-        weights: [[0.0; LANES]; 3],
-        geom: [0; LANES],
-        prim: [0; LANES],
-    };
+    fn over(meshes: Vec<Option<Buffers<'a>>>) -> Self {
+        Self {
+            o: [[0.25; LANES], [0.25; LANES], [1.0; LANES]],
+            d: [[0.0; LANES], [0.0; LANES], [-1.0; LANES]],
+            reported: [[0.25; LANES]; 2],
+            corners: [
+                [[0.0; LANES]; 3],
+                [[1.0; LANES], [0.0; LANES], [0.0; LANES]],
+                [[0.0; LANES], [1.0; LANES], [0.0; LANES]],
+            ],
+            normals: [[[0.0; LANES]; 3]; 3],
+            smooth: [false; LANES],
+            rounding: [0.0; LANES],
+            weights: [[0.0; LANES]; 3],
+            geom: [0; LANES],
+            prim: [0; LANES],
+            meshes,
+        }
+    }
 
     /// Looks up what belongs to the hits of the first `len` lanes: first where everything
     /// is, then everything, so that the memory has many questions to work on at a time.
-    fn gather(&mut self, scene: &Scene, block: &mut Block, palette: &Palette) {
+    fn gather(&mut self, block: &mut Block, palette: &Palette) {
         let mut faces = [[0; 3]; LANES];
-        let mut normals = [None; LANES];
+        let mut normals = [[0; 3]; LANES];
         for lane in 0..block.len {
-            let (mesh, _) = mesh_of(scene, self.geom[lane]);
-            let (data, prim) = (&*mesh.data, self.prim[lane]);
-            faces[lane] = data.triangles.faces()[prim as usize];
-            block.material[lane] = mesh.material(prim);
-            normals[lane] = data.normals.as_ref().map(|n| n.of(data.triangles.faces(), prim as usize));
+            let (at, prim) = (self.buffers(lane), self.prim[lane] as usize);
+            faces[lane] = at.triangles.faces()[prim];
+            block.material[lane] = at.first_material + at.materials.map_or(0, |m| m[prim]);
+            if let Some((indices, _)) = at.normals {
+                normals[lane] = indices[prim];
+            }
         }
         for lane in 0..block.len {
-            let (mesh, placed) = mesh_of(scene, self.geom[lane]);
+            let at = *self.buffers(lane);
             for (to, i) in self.corners.iter_mut().zip(faces[lane]) {
-                set(to, lane, mesh.data.triangles.point(i));
+                set(to, lane, at.triangles.point(i));
             }
-            let normals = normals[lane].and_then(|at| mesh.data.normals_at(at));
+            let normals = at.normals.and_then(|(_, values)| values.three(normals[lane]));
             self.smooth[lane] = normals.is_some();
-            for (to, n) in self.normals.iter_mut().zip(normals.unwrap_or_default()) {
-                set(to, lane, n);
+            if let Some(normals) = normals {
+                for (to, n) in self.normals.iter_mut().zip(normals) {
+                    set(to, lane, n.into());
+                }
             }
-            if let Some(instance) = placed {
+            if let Some(instance) = at.placed {
                 self.place(lane, instance);
             }
-            if mesh.mirrored {
+            if at.mesh.mirrored {
                 self.rewind(lane);
             }
-            block.paint(lane, palette.get(block.material[lane]));
         }
+        block.paint_all(palette);
+    }
+
+    #[inline]
+    fn buffers(&self, lane: usize) -> &Buffers<'a> {
+        self.meshes[self.geom[lane] as usize].as_ref().expect("hits of shapes are collected apart")
     }
 
     /// Moves corners and normals of an instance to scene space.
@@ -123,8 +164,8 @@ impl Facets {
         std::mem::swap(&mut u[lane], &mut v[lane]);
     }
 
-    fn uv(&self, scene: &Scene, lane: usize) -> Option<Vec2> {
-        let (mesh, _) = mesh_of(scene, self.geom[lane]);
+    fn uv(&self, lane: usize) -> Option<Vec2> {
+        let mesh = self.buffers(lane).mesh;
         let [a, b, c] = mesh.data.uvs_of(self.prim[lane])?;
         let [b, c] = if mesh.mirrored { [c, b] } else { [b, c] };
         let [wa, wb, wc] = [0, 1, 2].map(|corner| self.weights[corner][lane] as f32);
@@ -132,7 +173,7 @@ impl Facets {
     }
 }
 
-impl Hits for Facets {
+impl Hits for Facets<'_> {
     #[inline]
     fn set(&mut self, lane: usize, packet: &RayHitPacket, from: usize) {
         let ray = &packet.ray;
@@ -149,20 +190,31 @@ impl Hits for Facets {
         self.prim[lane] = packet.hit.prim_id[from];
     }
 
+    #[inline]
+    fn set_all(&mut self, packet: &RayHitPacket) {
+        let RayHitPacket { ray, hit } = packet;
+        self.o = [ray.o_x, ray.o_y, ray.o_z];
+        self.d = [ray.d_x, ray.d_y, ray.d_z];
+        self.reported = [hit.u, hit.v];
+        self.rounding = [0.0; LANES];
+        self.geom = hit.geom_id;
+        self.prim = hit.prim_id;
+    }
+
     fn finish(&mut self, len: usize, scene: &Scene, palette: &Palette, block: &mut Block) {
         block.len = len;
-        self.gather(scene, block, palette);
+        self.gather(block, palette);
         simd::run(Finish { facets: self, block });
-        palette.add_texels(scene, block, |_, lane| self.uv(scene, lane));
+        palette.add_texels(scene, block, |_, lane| self.uv(lane));
     }
 }
 
-struct Finish<'a> {
-    facets: &'a mut Facets,
+struct Finish<'a, 'scene> {
+    facets: &'a mut Facets<'scene>,
     block: &'a mut Block,
 }
 
-impl Kernel for Finish<'_> {
+impl Kernel for Finish<'_, '_> {
     type Output = ();
 
     #[inline(always)]
@@ -199,7 +251,7 @@ fn cross(a: V, b: V) -> V {
 /// The steps of [`geom::triangle::refine`](crate::geom::triangle::refine) for all lanes, and the
 /// facet's normal turned to the ray.
 #[inline(always)]
-fn refine(f: &Facets, out: &mut Points, weights: &mut [F64; 3]) {
+fn refine(f: &Facets<'_>, out: &mut Points, weights: &mut [F64; 3]) {
     for i in 0..LANES {
         let (o, d) = (wide(&f.o, i), wide(&f.d, i));
         let p0 = wide(&f.corners[0], i);
@@ -244,7 +296,7 @@ fn refine(f: &Facets, out: &mut Points, weights: &mut [F64; 3]) {
 ///
 /// Source of the lift: J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, ch. 4.
 #[inline(always)]
-fn shading_normals(f: &Facets, out: &mut Points, weights: &[F64; 3]) {
+fn shading_normals(f: &Facets<'_>, out: &mut Points, weights: &[F64; 3]) {
     if !f.smooth.contains(&true) {
         out.ns = out.ng;
         out.lifted = out.p;
@@ -295,7 +347,7 @@ mod tests {
             let at = corners[0] + (corners[1] - corners[0]) * inside.0 + (corners[2] - corners[0]) * inside.1;
             let ray = Ray::new(o, (at - o) * far);
             prop_assume!((corners[1] - corners[0]).cross(corners[2] - corners[0]).length() > 1e-3);
-            let mut facets = Facets::EMPTY;
+            let mut facets = Facets::over(Vec::new());
             for lane in 0..LANES {
                 for k in 0..3 {
                     facets.o[k][lane] = ray.o[k];

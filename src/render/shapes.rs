@@ -32,6 +32,12 @@ impl Hits for ShapeHits {
         self.prim[lane] = packet.hit.prim_id[from];
     }
 
+    fn set_all(&mut self, packet: &RayHitPacket) {
+        for lane in 0..LANES {
+            self.set(lane, packet, lane);
+        }
+    }
+
     fn finish(&mut self, len: usize, scene: &Scene, palette: &Palette, block: &mut Block) {
         block.len = len;
         let mut points = Points::EMPTY;
@@ -48,8 +54,8 @@ impl Hits for ShapeHits {
             put_point(&mut points, lane, &point, d);
             self.uv[lane] = point.uv;
             block.material[lane] = material;
-            block.paint(lane, palette.get(material));
         }
+        block.paint_all(palette);
         // Lanes without a hit repeat the first one: a packet with a NaN in it is slow to trace.
         for lane in len..LANES {
             repeat_first(&mut points, lane);

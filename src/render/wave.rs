@@ -83,7 +83,7 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
     is_mixed: bool,
     absorbs: bool,
     /// Absent where there are no meshes, and while in use.
-    facets: Option<Box<Facets>>,
+    facets: Option<Box<Facets<'a>>>,
     /// Likewise for shapes.
     shape_hits: Option<Box<ShapeHits>>,
     blocks: Vec<Block>,
@@ -130,7 +130,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             branching: scene.materials.iter().map(|m| m.reflects() || m.refracts()).collect(),
 
             absorbs: needs.absorption,
-            facets: is_shapes.contains(&false).then(|| Box::new(Facets::EMPTY)),
+            facets: is_shapes.contains(&false).then(|| Box::new(Facets::new(scene))),
             shape_hits: is_shapes.contains(&true).then(Box::default),
             is_mixed: is_shapes.contains(&false) && is_shapes.contains(&true),
             is_shapes,
@@ -213,6 +213,9 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
 
     fn misses(&mut self, batch: &PacketBatch<RayHitPacket>, path: &impl Fn(usize) -> Path) {
         for (k, packet) in batch.packets().iter().enumerate() {
+            if all_hit(packet) {
+                continue;
+            }
             let live = (batch.len() - k * LANES).min(LANES);
             for i in (0..live).filter(|&i| packet.hit.geom_id[i] == INVALID_ID) {
                 let path = path(k * LANES + i);
@@ -234,9 +237,21 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         shapes: bool,
         path: &impl Fn(usize) -> Path,
     ) {
+        // Nothing to sort out, nothing to work out: whole packets can go over.
+        let as_they_are = !self.is_mixed && !self.absorbs;
         let mut lane = 0;
         for (k, packet) in batch.packets().iter().enumerate() {
             let live = (batch.len() - k * LANES).min(LANES);
+            if lane == 0 && live == LANES && as_they_are && all_hit(packet) {
+                hits.set_all(packet);
+                let block = self.next_block();
+                for i in 0..LANES {
+                    block.set(i, &path(k * LANES + i));
+                    block.id[i] = [packet.hit.geom_id[i], packet.hit.prim_id[i]];
+                }
+                self.finish(hits, LANES);
+                continue;
+            }
             for i in 0..live {
                 let geom = packet.hit.geom_id[i];
                 if geom == INVALID_ID || (self.is_mixed && self.is_shapes[geom as usize] != shapes) {
@@ -246,24 +261,35 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
                 if self.absorbs {
                     path.weight = self.media.absorbed(&self.scene.materials, &path, distance(packet, i));
                 }
-                if self.used == self.blocks.len() {
-                    self.blocks.push(Block::EMPTY);
-                }
                 hits.set(lane, packet, i);
-                self.blocks[self.used].set(lane, &path);
-                self.blocks[self.used].id[lane] = [geom, packet.hit.prim_id[i]];
+                let block = self.next_block();
+                block.set(lane, &path);
+                block.id[lane] = [geom, packet.hit.prim_id[i]];
                 lane += 1;
                 if lane == LANES {
-                    hits.finish(lane, self.scene, &self.palette, &mut self.blocks[self.used]);
-                    self.used += 1;
+                    self.finish(hits, lane);
                     lane = 0;
                 }
             }
         }
         if lane > 0 {
-            hits.finish(lane, self.scene, &self.palette, &mut self.blocks[self.used]);
-            self.used += 1;
+            self.finish(hits, lane);
         }
+    }
+
+    /// The block that is being filled.
+    #[inline]
+    fn next_block(&mut self) -> &mut Block {
+        if self.used == self.blocks.len() {
+            self.blocks.push(Block::EMPTY);
+        }
+        &mut self.blocks[self.used]
+    }
+
+    /// Makes `len` collected hits into a block in use.
+    fn finish(&mut self, hits: &mut impl Hits, len: usize) {
+        hits.finish(len, self.scene, &self.palette, &mut self.blocks[self.used]);
+        self.used += 1;
     }
 
     fn shade(&mut self, segment: &Segment<'_>) {
@@ -434,6 +460,12 @@ impl Gathered {
         cut[0] += f64::from(most) * f64::from(bound.fixed);
         cut[1] += f64::from(most) * f64::from(bound.scaled);
     }
+}
+
+/// Whether all lanes of a packet hold a hit; those without a ray may hold an old one.
+#[inline]
+fn all_hit(packet: &RayHitPacket) -> bool {
+    packet.hit.geom_id.iter().fold(true, |all, &geom| all & (geom != INVALID_ID))
 }
 
 /// Length of ray `lane` up to its hit.

@@ -153,22 +153,12 @@ impl Mesh {
 }
 
 impl MeshData {
-    /// The three normals with these numbers; `None` unless there are all three.
-    #[inline]
-    #[must_use]
-    pub fn normals_at(&self, numbers: [u32; 3]) -> Option<[Vec3; 3]> {
-        let normals = self.normals.as_ref()?;
-        let [a, b, c] = numbers.map(|i| normals.get::<3>(i).map(Vec3::from));
-        Some([a?, b?, c?])
-    }
-
     /// The texture coordinates at the corners of triangle `prim`; `None` unless there are all three.
     #[inline]
     #[must_use]
     pub fn uvs_of(&self, prim: u32) -> Option<[Vec2; 3]> {
         let uvs = self.uvs.as_ref()?;
-        let [a, b, c] = uvs.of(self.triangles.faces(), prim as usize).map(|i| uvs.get::<2>(i).map(Vec2::from));
-        Some([a?, b?, c?])
+        Some(uvs.three(uvs.of(self.triangles.faces(), prim as usize))?.map(Vec2::from_array))
     }
 
     /// Bytes of all buffers.

@@ -34,6 +34,14 @@ impl CornerData {
         self.values.get(at..at.checked_add(N)?)?.try_into().ok()
     }
 
+    /// The `N` components of the three values with these numbers; nothing unless there are all three.
+    #[inline]
+    #[must_use]
+    pub fn three<const N: usize>(&self, numbers: [u32; 3]) -> Option<[[f32; N]; 3]> {
+        let [a, b, c] = numbers.map(|i| self.get(i));
+        Some([a?, b?, c?])
+    }
+
     /// Bytes of the buffers.
     #[must_use]
     pub fn bytes(&self) -> usize {
