@@ -24,6 +24,7 @@ Exit codes:
   2  wrong usage
   3  the scene or a file it names is at fault
   4  the output could not be written
+  5  a comparison found a difference (tison verify)
   6  refused by a limit (memory, size)
   70 internal error
   130, 143  stopped by SIGINT or SIGTERM; what was rendered is saved";
@@ -70,6 +71,9 @@ pub enum Command {
     Info(InfoArgs),
     /// Read and validate a file; render nothing
     Check(CheckArgs),
+    /// Send the same rays through both backends and read meshes with both readers, and compare
+    #[command(after_long_help = super::verify::AFTER_HELP)]
+    Verify(super::verify::VerifyArgs),
     /// Write an example; without a name, list them
     Example {
         #[command(subcommand)]

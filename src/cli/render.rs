@@ -310,7 +310,8 @@ fn notes(plan: &Plan, settings: &Settings, backend: &AnyBackend) -> Notes {
     }
 }
 
-fn build_failure(e: &backend::Error) -> Failure {
+/// Why there is no backend.
+pub fn build_failure(e: &backend::Error) -> Failure {
     let exit = match e {
         backend::Error::NotCompiledIn => Exit::Usage,
         #[cfg(feature = "embree")]

@@ -172,14 +172,24 @@ pub struct Counts {
 /// [`Error::TooMany`] beyond what 32-bit indices can count, [`Error::Cancelled`];
 /// [`Error::SecondReader`] for what tobj cannot read, if it is asked.
 pub fn read(path: &Path, options: &ReadOptions<'_>) -> Result<ObjFile, Error> {
-    /// Small enough for a second-level cache, large enough to make each piece's own cost vanish.
-    const PIECE: u64 = 1 << 18;
     let source = source::Source::open(path, options.cancel)?;
     match options.reader {
         Reader::Own => read::read(&source, options, PIECE),
         Reader::Tobj => second::read(&source, options, PIECE),
     }
 }
+
+/// The line of the face that triangle number `triangle` is made of, as our own reader counts them; none if there are
+/// fewer.
+///
+/// # Errors
+/// As [`read`].
+pub fn line_of_triangle(path: &Path, triangle: u64, options: &ReadOptions<'_>) -> Result<Option<u64>, Error> {
+    read::line_of_triangle(&source::Source::open(path, options.cancel)?, triangle, options, PIECE)
+}
+
+/// Bytes of a piece: small enough for a second-level cache, large enough to make each piece's own cost vanish.
+const PIECE: u64 = 1 << 18;
 
 /// Bytes as text, whatever they are.
 fn text(bytes: &[u8]) -> String {

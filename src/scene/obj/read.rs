@@ -74,6 +74,28 @@ pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Re
     })
 }
 
+/// The line of the face that triangle number `triangle` is made of.
+pub(super) fn line_of_triangle(
+    source: &Source,
+    triangle: u64,
+    options: &ReadOptions<'_>,
+    piece: u64,
+) -> Result<Option<u64>, Error> {
+    let pieces = Pieces::cut(source, options, piece)?;
+    let sampling = Sampling::of_file(source.len);
+    let jobs = || vec![(); pieces.ranges.len()];
+    let start = |i: usize| pieces.ranges[i].start;
+    let surveys = pieces.each(jobs(), &[], |i, (), text, joined| Ok(survey::survey(text, start(i), joined, sampling)))?;
+    let (before, _) = running_totals(&surveys);
+    let places = pieces.each(jobs(), &surveys, |i, (), text, _| {
+        let here = before[i].triangles..before[i].triangles + surveys[i].tally.triangles;
+        let wanted = here.contains(&triangle).then(|| triangle - before[i].triangles);
+        Ok(wanted.and_then(|wanted| survey::place_of_triangle(text, start(i), wanted)))
+    })?;
+    let offset = places.into_iter().flatten().next();
+    offset.map(|offset| Ok(pieces.place(offset, &surveys)?.0)).transpose()
+}
+
 /// What was odd, in the order of the file.
 pub(super) fn warnings(pieces: &Pieces<'_>, surveys: &[Survey], notes: Notes) -> Result<Vec<Warning>, Error> {
     let told = notes.sorted().into_iter().map(|note| {
