@@ -6,6 +6,7 @@
 //!
 //! | room | job |
 //! |---|---|
+//! | [`verify`] | the same rays through both backends, the same file through both readers |
 //! | [`render`] | tiles, waves of rays, shading |
 //! | [`backend`] | the seam: who answers a ray |
 //! | [`film`] | pixels in, files out |
@@ -35,3 +36,4 @@ pub mod render;
 pub mod scene;
 #[allow(unsafe_code, reason = "calling a function compiled for instructions that were looked for first")]
 pub mod simd;
+pub mod verify;

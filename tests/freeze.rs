@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 use tison::geom::{BAD_FACE, ShapeSet};
 use tison::scene::format::Look;
+use tison::scene::obj::Reader;
 use tison::scene::{AnyShapes, Error, LoadOptions, Loaded, Material, Mesh, MeshPaint, Object, Unused, load};
 
 /// A folder with a scene in it.
@@ -42,7 +43,7 @@ impl Folder {
     fn load_with(&self, name: &str, change: impl FnOnce(&mut LoadOptions<'_>)) -> Result<Loaded, Error> {
         static GO_ON: AtomicBool = AtomicBool::new(false);
         let mut options =
-            LoadOptions { smooth: None, allow: vec![], overrides: vec![], cancel: &GO_ON, progress: None };
+            LoadOptions { reader: Reader::Own, smooth: None, allow: vec![], overrides: vec![], cancel: &GO_ON, progress: None };
         change(&mut options);
         load(&self.path(name), &options)
     }
@@ -644,7 +645,7 @@ fn options_reach_the_reader() {
     let tell = |done, total| told.lock().expect("nothing panics here").push((done, total));
     let tell: &(dyn Fn(u64, u64) + Sync) = &tell;
     let stop = AtomicBool::new(false);
-    let options = LoadOptions { smooth: None, allow: vec![], overrides: vec![], cancel: &stop, progress: Some(tell) };
+    let options = LoadOptions { reader: Reader::Own, smooth: None, allow: vec![], overrides: vec![], cancel: &stop, progress: Some(tell) };
     load(&folder.path("a.toml"), &options).expect("it is good");
     let total = 2 * (TRIANGLE.len() + BOX.len()) as u64;
     let told = told.lock().expect("nothing panics here");

@@ -12,6 +12,7 @@ use tison::backend::{AnyBackend, BackendKind, BuildOptions};
 use tison::film::Film;
 use tison::math::colour::Srgb8;
 use tison::render::{self, Control, Crop, Job};
+use tison::scene::obj::Reader;
 use tison::scene::{self, CameraDesc, CameraOverrides, LoadOptions, Loaded, View};
 
 /// How far a picture may be from the stored one.
@@ -83,7 +84,7 @@ const LARGE: &[&str] =
 
 fn load(file: &str) -> Loaded {
     let cancel = AtomicBool::new(false);
-    let options = LoadOptions { smooth: None, allow: vec![], overrides: vec![], cancel: &cancel, progress: None };
+    let options = LoadOptions { reader: Reader::Own, smooth: None, allow: vec![], overrides: vec![], cancel: &cancel, progress: None };
     let loaded = scene::load(&Path::new("scenes").join(file), &options).unwrap_or_else(|e| panic!("{e}"));
     assert!(loaded.diagnostics.is_empty() && loaded.warnings.is_empty(), "{file} has warnings: see tison check");
     loaded

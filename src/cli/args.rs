@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use tison::backend::BackendKind;
 use tison::film::{Aov, Tonemap};
 use tison::scene::desc::LensSampler;
+use tison::scene::obj::Reader;
 
 /// What the whole help ends with.
 const AFTER_HELP: &str = "\
@@ -23,6 +24,7 @@ Exit codes:
   2  wrong usage
   3  the scene or a file it names is at fault
   4  the output could not be written
+  5  a comparison found a difference (tison verify)
   6  refused by a limit (memory, size)
   70 internal error
   130, 143  stopped by SIGINT or SIGTERM; what was rendered is saved";
@@ -69,6 +71,9 @@ pub enum Command {
     Info(InfoArgs),
     /// Read and validate a file; render nothing
     Check(CheckArgs),
+    /// Send the same rays through both backends and read meshes with both readers, and compare
+    #[command(after_long_help = super::verify::AFTER_HELP)]
+    Verify(super::verify::VerifyArgs),
     /// Write an example; without a name, list them
     Example {
         #[command(subcommand)]
@@ -133,6 +138,12 @@ pub struct ReadingArgs {
     /// A folder that the scene may name files in, besides its own; may be repeated
     #[arg(long, value_name = "DIR", help_heading = "Scene")]
     pub allow_path: Vec<PathBuf>,
+    /// Who reads meshes: tison's own reader, or the crate tobj as a second opinion
+    #[arg(
+        long, value_name = "NAME", value_parser = obj_reader(), default_value = Reader::Own.name(),
+        help_heading = "Scene"
+    )]
+    pub obj_reader: Reader,
 }
 
 #[derive(Args, Debug)]
@@ -342,6 +353,11 @@ fn aov() -> impl TypedValueParser<Value = Aov> {
 fn tonemap() -> impl TypedValueParser<Value = Tonemap> {
     PossibleValuesParser::new(Tonemap::ALL.map(Tonemap::name))
         .map(|name| Tonemap::ALL.into_iter().find(|t| t.name() == name).expect("only their names are possible"))
+}
+
+fn obj_reader() -> impl TypedValueParser<Value = Reader> {
+    PossibleValuesParser::new(Reader::ALL.map(Reader::name))
+        .map(|name| Reader::ALL.into_iter().find(|r| r.name() == name).expect("only their names are possible"))
 }
 
 fn lens_sampler() -> impl TypedValueParser<Value = LensSampler> {

@@ -6,6 +6,7 @@ use super::render::Ready;
 use super::settings::{Origin, Setting, origin_in_scene};
 use std::fmt::Write;
 use tison::scene::Loaded;
+use tison::scene::obj::Reader;
 
 /// What the flags say about the run, none of which changes the picture but `smooth`.
 pub fn of_run(args: &RenderArgs, plan: &Plan) -> Vec<Setting> {
@@ -18,6 +19,7 @@ pub fn of_run(args: &RenderArgs, plan: &Plan) -> Vec<Setting> {
     list.extend(plan.stats.iter().map(|t| given("stats", t.name())));
     list.push(setting("backend", plan.backend.name().into(), args.backend.is_some()));
     list.push(setting("threads", plan.threads.to_string(), args.threads.is_some()));
+    list.push(setting("obj-reader", plan.reader.name().into(), plan.reader != Reader::default()));
     list.extend(plan.smooth.map(|angle| given("smooth", angle.to_string())));
     list.extend(plan.camera.turntable.map(|n| given("turntable", n.to_string())));
     list.extend(plan.allow.iter().map(|dir| given("allow-path", dir.display().to_string())));

@@ -21,6 +21,8 @@ pub enum Exit {
     Input = 3,
     /// Output could not be written.
     Output = 4,
+    /// A comparison found a difference.
+    Differs = 5,
     /// Refused by a limit.
     Limit = 6,
     /// A bug of ours.

@@ -14,6 +14,7 @@ use tison::backend::BackendKind;
 use tison::film::{self, Aov};
 use tison::scene::desc::RenderDesc;
 use tison::scene::format;
+use tison::scene::obj::Reader;
 
 /// A render, as it will be done.
 #[derive(Debug)]
@@ -34,6 +35,8 @@ pub struct Plan {
     pub camera: CameraArgs,
     /// Auxiliary images, each once.
     pub aovs: Vec<Aov>,
+    /// Who reads meshes.
+    pub reader: Reader,
     /// Who answers the rays.
     pub backend: BackendKind,
     /// Threads to work with.
@@ -103,6 +106,7 @@ impl Plan {
             smooth: args.smooth,
             defines: args.reading.define.clone(),
             allow: args.reading.allow_path.clone(),
+            reader: args.reading.obj_reader,
             picture: args.picture.clone(),
             camera: args.camera.clone(),
             aovs: each_once(&args.aov),

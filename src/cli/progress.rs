@@ -24,6 +24,7 @@ pub enum Stage {
     Read,
     Build,
     Render,
+    Compare,
     Write,
 }
 
@@ -33,6 +34,7 @@ impl Stage {
             Self::Read => "read",
             Self::Build => "build",
             Self::Render => "render",
+            Self::Compare => "compare",
             Self::Write => "write",
         }
     }
@@ -228,11 +230,11 @@ impl View {
         const WIDTH: usize = 32;
         let (name, text) = (self.stage.name(), self.text());
         if self.stage == Stage::Write {
-            return format!("{name:>6}  {text}");
+            return format!("{name:>7}  {text}");
         }
         let full = (self.share * WIDTH as f64) as usize;
         let bar = "█".repeat(full) + &"░".repeat(WIDTH - full);
-        format!("{name:>6} {bar} {:>3.0} %  {text}", 100.0 * self.share)
+        format!("{name:>7} {bar} {:>3.0} %  {text}", 100.0 * self.share)
     }
 
     fn json(&self) -> serde_json::Value {

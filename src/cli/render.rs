@@ -20,6 +20,7 @@ use tison::backend::{self, AnyBackend, BuildOptions};
 use tison::film::{self, Display, Film, Notes, Tonemap};
 use tison::render::{self, Control, Job, RenderStats};
 use tison::scene::format::Override;
+use tison::scene::obj::Reader;
 use tison::scene::{self, CameraDesc, Light, LoadOptions, Loaded, Scene};
 
 /// Does what the plan says.
@@ -180,7 +181,8 @@ impl Run<'_> {
     fn read(&self) -> Result<Ready, Failure> {
         let plan = self.plan;
         self.progress.stage(Stage::Read);
-        let reading = Reading { smooth: plan.smooth, allow: &plan.allow, defines: &plan.defines };
+        let reading =
+            Reading { reader: plan.reader, smooth: plan.smooth, allow: &plan.allow, defines: &plan.defines };
         let loaded = load(&plan.input, &reading, self.control, &self.progress)?;
         let mut notices = Notice::about(&loaded);
         let settings = Settings::new(plan, &loaded.render)?;
@@ -258,6 +260,7 @@ impl Run<'_> {
 /// How a file is read, as the flags have it.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading<'a> {
+    pub reader: Reader,
     pub smooth: Option<f64>,
     pub allow: &'a [PathBuf],
     pub defines: &'a [String],
@@ -272,6 +275,7 @@ pub fn load(
 ) -> Result<Loaded, scene::Error> {
     let report = |done: u64, total: u64| progress.report(done as f64 / total.max(1) as f64);
     let options = LoadOptions {
+        reader: reading.reader,
         smooth: reading.smooth,
         allow: reading.allow.to_vec(),
         overrides: reading.defines.iter().map(|d| Override::from(d.as_str())).collect(),
@@ -306,7 +310,8 @@ fn notes(plan: &Plan, settings: &Settings, backend: &AnyBackend) -> Notes {
     }
 }
 
-fn build_failure(e: &backend::Error) -> Failure {
+/// Why there is no backend.
+pub fn build_failure(e: &backend::Error) -> Failure {
     let exit = match e {
         backend::Error::NotCompiledIn => Exit::Usage,
         #[cfg(feature = "embree")]

@@ -13,11 +13,14 @@ mod paint;
 mod shade;
 mod shapes;
 mod surface;
+mod surfaces;
 mod tile;
 mod wave;
 
 pub use explain::explain_pixel;
 pub use job::{Control, Crop, Job, Outcome, RayCounts, RenderStats};
+pub use surface::SurfacePoint;
+pub use surfaces::Surfaces;
 
 use crate::backend::{AnyBackend, Backend};
 use crate::film::{Aov, AovImage, Film};

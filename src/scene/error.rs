@@ -65,6 +65,16 @@ pub enum Error {
         /// Triangles in it.
         faces: usize,
     },
+    /// The second OBJ reader does not read what the first one may well do.
+    #[error("{}:{} tobj cannot read it: {what}", path.display(), line.map(|line| format!("{line}:")).unwrap_or_default())]
+    SecondReader {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1, where it is known.
+        line: Option<u64>,
+        /// What is wrong.
+        what: String,
+    },
     /// More of something than 32-bit numbers can index.
     #[error("{}: {count} {what}, but at most {limit} can be indexed: split the file", path.display())]
     TooMany {

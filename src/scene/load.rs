@@ -3,7 +3,7 @@
 use super::desc::{NamedCamera, RenderDesc};
 use super::format::{Diagnostic, Override};
 use super::freeze::{self, Assets, MeshFile, Wanted};
-use super::obj::Uv;
+use super::obj::{Reader, Uv};
 use super::texture::Encoding;
 use super::{Error, MeshPaint, Object, Scene, Warning};
 use glam::{DAffine3, Vec3};
@@ -13,6 +13,8 @@ use std::sync::atomic::AtomicBool;
 /// How to read a scene.
 #[derive(Clone)]
 pub struct LoadOptions<'a> {
+    /// Who reads meshes.
+    pub reader: Reader,
     /// Crease angle in degrees for computing normals where the file has none; `None`: flat.
     pub smooth: Option<f64>,
     /// Folders besides the file's own that it may name files in.

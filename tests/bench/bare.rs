@@ -16,6 +16,7 @@ use tison::backend::{AnyBackend, Backend, BackendKind, BuildOptions};
 use tison::geom::{Coherence, Hit, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
 use tison::render::{self, Control, Crop, Job};
 use tison::scene::desc::LensSampler;
+use tison::scene::obj::Reader;
 use tison::scene::{self, CameraOverrides, LoadOptions, Projection, Scene, View};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -24,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
     let model = args.model()?;
     let cancel = AtomicBool::new(false);
-    let options = LoadOptions { smooth: None, allow: vec![], overrides: vec![], cancel: &cancel, progress: None };
+    let options = LoadOptions { reader: Reader::Own, smooth: None, allow: vec![], overrides: vec![], cancel: &cancel, progress: None };
     let mut scene = scene::load(&model, &options)?.scene;
     let aspect = f64::from(args.size.0) / f64::from(args.size.1);
     let camera = scene.auto_camera(View::ThreeQuarter, &args.camera, aspect)?;

@@ -6,6 +6,7 @@ use tison::backend::{AnyBackend, BackendKind, BuildOptions};
 use tison::film::Aov;
 use tison::render::{self, Control, Crop, Job, Outcome};
 use tison::scene::desc::LensSampler;
+use tison::scene::obj::Reader;
 use tison::scene::{self, CameraDesc, LoadOptions, Loaded};
 
 pub fn load(toml: &str) -> Loaded {
@@ -13,7 +14,7 @@ pub fn load(toml: &str) -> Loaded {
     let path = dir.path().join("scene.toml");
     std::fs::write(&path, format!("tison = 1\n{toml}")).expect("a file in it");
     let cancel = AtomicBool::new(false);
-    let options = LoadOptions { smooth: None, allow: vec![], overrides: vec![], cancel: &cancel, progress: None };
+    let options = LoadOptions { reader: Reader::Own, smooth: None, allow: vec![], overrides: vec![], cancel: &cancel, progress: None };
     scene::load(&path, &options).unwrap_or_else(|e| panic!("{e}\n{toml}"))
 }
 

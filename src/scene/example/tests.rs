@@ -26,8 +26,7 @@ fn parse(text: &str) -> Parsed {
     let (models, _) = tobj::load_obj_buf(&mut BufReader::new(text.as_bytes()), &options, no_materials).unwrap();
     let mesh = &models[0].mesh;
     assert!(mesh.normal_indices == mesh.indices || mesh.normals.is_empty());
-    let vectors =
-        |all: &[f32]| all.chunks_exact(3).map(|v| DVec3::new(v[0].into(), v[1].into(), v[2].into())).collect();
+    let vectors = |all: &[f64]| all.chunks_exact(3).map(DVec3::from_slice).collect();
     let faces = mesh.indices.chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect();
     Parsed { points: vectors(&mesh.positions), normals: vectors(&mesh.normals), faces, models }
 }

@@ -40,6 +40,7 @@ impl MeshFile {
     /// Reads the file at `path`; bytes done and in all go to `progress`.
     pub fn read(path: &Path, wanted: Wanted, assets: &mut Assets<'_>, progress: Progress<'_>) -> Result<Self, Error> {
         let read = obj::ReadOptions {
+            reader: assets.options.reader,
             normals: true,
             uv: wanted.uv,
             materials: wanted.materials,

@@ -19,6 +19,7 @@ mod parse;
 mod pieces;
 mod polygon;
 mod read;
+mod second;
 mod source;
 mod survey;
 #[cfg(test)]
@@ -32,9 +33,35 @@ use crate::math::Frame;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
+/// Who reads the numbers and faces of a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Reader {
+    /// Ours.
+    #[default]
+    Own,
+    /// The crate tobj: one thread, most of the format, errors without columns.
+    Tobj,
+}
+
+impl Reader {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Own, Self::Tobj];
+
+    /// The name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Own => "own",
+            Self::Tobj => "tobj",
+        }
+    }
+}
+
 /// What to read, and from where.
 #[derive(Clone, Copy)]
 pub struct ReadOptions<'a> {
+    /// Who reads it.
+    pub reader: Reader,
     /// Whether normals are wanted. What is not wanted is checked but not stored.
     pub normals: bool,
     /// Whether texture coordinates are wanted.
@@ -61,9 +88,21 @@ pub enum Uv {
     Always,
 }
 
+impl ReadOptions<'_> {
+    /// Whether texture coordinates are wanted on faces that have `materials`.
+    fn wants_uv(&self, materials: &[MtlMaterial]) -> bool {
+        match self.uv {
+            Uv::Never => false,
+            Uv::IfTextured => materials.iter().any(|m| m.map_kd.is_some()),
+            Uv::Always => true,
+        }
+    }
+}
+
 impl std::fmt::Debug for ReadOptions<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let mut f = f.debug_struct("ReadOptions");
+        f.field("reader", &self.reader);
         f.field("normals", &self.normals).field("uv", &self.uv).field("materials", &self.materials);
         f.field("allow", &self.allow).finish_non_exhaustive()
     }
@@ -130,12 +169,27 @@ pub struct Counts {
 /// [`Error::Read`] and [`Error::NotAFile`] for what is no readable file, [`Error::At`] for
 /// the first line that cannot be understood, [`Error::NoFaces`] for a file with nothing to
 /// render, [`Error::Forbidden`] for a library or image outside the allowed folders,
-/// [`Error::TooMany`] beyond what 32-bit indices can count, [`Error::Cancelled`].
+/// [`Error::TooMany`] beyond what 32-bit indices can count, [`Error::Cancelled`];
+/// [`Error::SecondReader`] for what tobj cannot read, if it is asked.
 pub fn read(path: &Path, options: &ReadOptions<'_>) -> Result<ObjFile, Error> {
-    /// Small enough for a second-level cache, large enough to make each piece's own cost vanish.
-    const PIECE: u64 = 1 << 18;
-    read::read(&source::Source::open(path, options.cancel)?, options, PIECE)
+    let source = source::Source::open(path, options.cancel)?;
+    match options.reader {
+        Reader::Own => read::read(&source, options, PIECE),
+        Reader::Tobj => second::read(&source, options, PIECE),
+    }
 }
+
+/// The line of the face that triangle number `triangle` is made of, as our own reader counts them; none if there are
+/// fewer.
+///
+/// # Errors
+/// As [`read`].
+pub fn line_of_triangle(path: &Path, triangle: u64, options: &ReadOptions<'_>) -> Result<Option<u64>, Error> {
+    read::line_of_triangle(&source::Source::open(path, options.cancel)?, triangle, options, PIECE)
+}
+
+/// Bytes of a piece: small enough for a second-level cache, large enough to make each piece's own cost vanish.
+const PIECE: u64 = 1 << 18;
 
 /// Bytes as text, whatever they are.
 fn text(bytes: &[u8]) -> String {

@@ -284,7 +284,7 @@ fn write_unless_zero(slots: &mut [[u32; 3]], t: usize, value: [u32; 3]) {
 }
 
 /// `n` with length one; zero stays zero.
-fn unit(n: DVec3) -> DVec3 {
+pub(super) fn unit(n: DVec3) -> DVec3 {
     let squared = n.length_squared();
     if (1e-200..1e200).contains(&squared) {
         return n / squared.sqrt();

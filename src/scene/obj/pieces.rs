@@ -83,13 +83,17 @@ impl<'a> Pieces<'a> {
         let range = &self.ranges[i];
         let joined = self.source.lines(range, buf).map_err(Stop::Error)?;
         let result = work(buf, joined).map_err(Stop::Trouble)?;
-        let length = range.end - range.start;
+        self.gone_over(range.end - range.start);
+        Ok(result)
+    }
+
+    /// Notes that so many bytes more are done.
+    pub(super) fn gone_over(&self, length: u64) {
         let done = self.done.fetch_add(length, Ordering::Relaxed) + length;
         if let Some(progress) = self.options.progress {
             let total = 2 * self.source.len;
             progress(done.min(total), total);
         }
-        Ok(result)
     }
 
     fn located(&self, piece: usize, trouble: Trouble, surveys: &[Survey]) -> Error {

@@ -8,7 +8,7 @@ use super::pieces::Pieces;
 use super::polygon;
 use super::source::Source;
 use super::survey::{self, Sampling, Survey, Tally, cut, running_totals};
-use super::{CornerData, Counts, ObjFile, ReadOptions, Uv};
+use super::{CornerData, Counts, ObjFile, ReadOptions};
 use crate::math::Frame;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -16,6 +16,11 @@ use rayon::prelude::*;
 /// Sizes that a stored mesh may have, as multiples of what the sample of its vertices led
 /// to expect; beyond them the frame is made anew.
 const FITTING: std::ops::RangeInclusive<f64> = 1.0 / 65_536.0..=4_294_967_296.0;
+
+/// Whether a mesh of which the sample expects a size of about 1 may have this one.
+pub(super) fn fits(reach: f64) -> bool {
+    FITTING.contains(&reach)
+}
 
 /// Reads `source` in pieces of about `piece` bytes.
 pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Result<ObjFile, Error> {
@@ -28,11 +33,7 @@ pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Re
     check_size(&total, &pieces)?;
     // Before anything is parsed: whether an image is sampled decides what is stored.
     let materials = Materials::of(&pieces, &surveys, &before, &total)?;
-    let uv_wanted = match options.uv {
-        Uv::Never => false,
-        Uv::IfTextured => materials.described.materials.iter().any(|m| m.map_kd.is_some()),
-        Uv::Always => true,
-    };
+    let uv_wanted = options.wants_uv(&materials.described.materials);
     let plan = Plan {
         frame: Frame::fit(&sampling.merge(surveys.iter())),
         total,
@@ -53,11 +54,7 @@ pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Re
 
     let notes = gather(&mut surveys, &mut parsed);
     let counts = counts(&total, clipped, &notes);
-    let mut warnings = Vec::new();
-    for note in notes.sorted() {
-        let (line, _) = pieces.place(note.offset, &surveys)?;
-        warnings.push(Warning::at(&source.path, line, note.message()));
-    }
+    let mut warnings = warnings(&pieces, &surveys, notes)?;
     let Materials { runs, described } = materials;
     warnings.extend(described.warnings);
     Ok(ObjFile {
@@ -77,15 +74,46 @@ pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Re
     })
 }
 
+/// The line of the face that triangle number `triangle` is made of.
+pub(super) fn line_of_triangle(
+    source: &Source,
+    triangle: u64,
+    options: &ReadOptions<'_>,
+    piece: u64,
+) -> Result<Option<u64>, Error> {
+    let pieces = Pieces::cut(source, options, piece)?;
+    let sampling = Sampling::of_file(source.len);
+    let jobs = || vec![(); pieces.ranges.len()];
+    let start = |i: usize| pieces.ranges[i].start;
+    let surveys = pieces.each(jobs(), &[], |i, (), text, joined| Ok(survey::survey(text, start(i), joined, sampling)))?;
+    let (before, _) = running_totals(&surveys);
+    let places = pieces.each(jobs(), &surveys, |i, (), text, _| {
+        let here = before[i].triangles..before[i].triangles + surveys[i].tally.triangles;
+        let wanted = here.contains(&triangle).then(|| triangle - before[i].triangles);
+        Ok(wanted.and_then(|wanted| survey::place_of_triangle(text, start(i), wanted)))
+    })?;
+    let offset = places.into_iter().flatten().next();
+    offset.map(|offset| Ok(pieces.place(offset, &surveys)?.0)).transpose()
+}
+
+/// What was odd, in the order of the file.
+pub(super) fn warnings(pieces: &Pieces<'_>, surveys: &[Survey], notes: Notes) -> Result<Vec<Warning>, Error> {
+    let told = notes.sorted().into_iter().map(|note| {
+        let (line, _) = pieces.place(note.offset, surveys)?;
+        Ok(Warning::at(&pieces.source.path, line, note.message()))
+    });
+    told.collect()
+}
+
 /// Which triangles have which materials, and what is said about those.
 #[derive(Default)]
-struct Materials {
-    runs: Runs,
-    described: Described,
+pub(super) struct Materials {
+    pub(super) runs: Runs,
+    pub(super) described: Described,
 }
 
 impl Materials {
-    fn of(pieces: &Pieces<'_>, surveys: &[Survey], before: &[Tally], total: &Tally) -> Result<Self, Error> {
+    pub(super) fn of(pieces: &Pieces<'_>, surveys: &[Survey], before: &[Tally], total: &Tally) -> Result<Self, Error> {
         if !pieces.options.materials {
             return Ok(Self::default());
         }
@@ -182,7 +210,7 @@ fn settle(of: &mut Option<Option<Vec<[u32; 3]>>>, values: &mut Vec<f32>, usage: 
 }
 
 /// Everything must be countable by 32 bits, with one number to spare for "none".
-fn check_size(total: &Tally, pieces: &Pieces<'_>) -> Result<(), Error> {
+pub(super) fn check_size(total: &Tally, pieces: &Pieces<'_>) -> Result<(), Error> {
     const LIMIT: u64 = u32::MAX as u64 - 1;
     let all = [
         ("vertices", total.vertices),
@@ -296,19 +324,19 @@ fn split_in_piece(points: &[f32], target: &mut FaceTarget<'_>, found: &Parsed) -
 }
 
 /// The corners of the polygon that a fan was made of.
-fn fan_corners(fan: &[[u32; 3]]) -> impl Iterator<Item = u32> {
+pub(super) fn fan_corners(fan: &[[u32; 3]]) -> impl Iterator<Item = u32> {
     fan[0][..2].iter().copied().chain(fan.iter().map(|t| t[2]))
 }
 
 /// Replaces a fan by `triangles` over its corners.
-fn rewrite(fan: &mut [[u32; 3]], triangles: &[[u32; 3]]) {
+pub(super) fn rewrite(fan: &mut [[u32; 3]], triangles: &[[u32; 3]]) {
     let corners: Vec<u32> = fan_corners(fan).collect();
     for (slot, t) in fan.iter_mut().zip(triangles) {
         *slot = t.map(|k| corners[k as usize]);
     }
 }
 
-fn gather(surveys: &mut [Survey], parsed: &mut [Parsed]) -> Notes {
+pub(super) fn gather(surveys: &mut [Survey], parsed: &mut [Parsed]) -> Notes {
     let mut notes = Notes::default();
     for s in surveys {
         notes.append(std::mem::take(&mut s.notes));
@@ -319,7 +347,7 @@ fn gather(surveys: &mut [Survey], parsed: &mut [Parsed]) -> Notes {
     notes
 }
 
-fn counts(total: &Tally, clipped: u64, notes: &Notes) -> Counts {
+pub(super) fn counts(total: &Tally, clipped: u64, notes: &Notes) -> Counts {
     Counts {
         vertices: total.vertices,
         textures: total.textures,

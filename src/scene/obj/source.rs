@@ -65,14 +65,20 @@ impl Source {
         }
     }
 
-    /// Fills `buf` with the lines of `range`, one of [`pieces`](Self::pieces), ready to be
-    /// parsed: continued lines are joined and a byte order mark is blanked, in place, so
-    /// that offsets stay those of the file. Returns the number of line ends that are gone.
-    pub(super) fn lines(&self, range: &Range<u64>, buf: &mut Vec<u8>) -> Result<u64, Error> {
+    /// Fills `buf` with the lines of `range` as they are, but for a byte order mark, which is blanked.
+    pub(super) fn text(&self, range: &Range<u64>, buf: &mut Vec<u8>) -> Result<(), Error> {
         self.bytes(range.clone(), buf)?;
         if range.start == 0 && buf.starts_with(BYTE_ORDER_MARK) {
             buf[..BYTE_ORDER_MARK.len()].fill(b' ');
         }
+        Ok(())
+    }
+
+    /// Fills `buf` with the lines of `range`, one of [`pieces`](Self::pieces), ready to be
+    /// parsed: continued lines are joined and a byte order mark is blanked, in place, so
+    /// that offsets stay those of the file. Returns the number of line ends that are gone.
+    pub(super) fn lines(&self, range: &Range<u64>, buf: &mut Vec<u8>) -> Result<u64, Error> {
+        self.text(range, buf)?;
         Ok(if memchr::memchr(b'\\', buf).is_some() { join_lines(buf) } else { 0 })
     }
 

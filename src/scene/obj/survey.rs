@@ -183,3 +183,20 @@ pub(super) fn cut<T>(mut all: &mut [T], lengths: impl Iterator<Item = usize>) ->
         })
         .collect()
 }
+
+/// The byte of the file at which the face begins that triangle `wanted` of this piece is made of.
+pub(super) fn place_of_triangle(text: &[u8], start: u64, wanted: u64) -> Option<u64> {
+    let mut c = Cursor::new(text);
+    let mut triangles = 0;
+    while !c.at_end() {
+        let offset = start + c.pos() as u64;
+        if c.statement() == Statement::Face {
+            triangles += c.count_words().saturating_sub(2);
+            if triangles > wanted {
+                return Some(offset);
+            }
+        }
+        c.next_line();
+    }
+    None
+}
