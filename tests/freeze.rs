@@ -42,8 +42,14 @@ impl Folder {
 
     fn load_with(&self, name: &str, change: impl FnOnce(&mut LoadOptions<'_>)) -> Result<Loaded, Error> {
         static GO_ON: AtomicBool = AtomicBool::new(false);
-        let mut options =
-            LoadOptions { reader: Reader::Own, smooth: None, allow: vec![], overrides: vec![], cancel: &GO_ON, progress: None };
+        let mut options = LoadOptions {
+            reader: Reader::Own,
+            smooth: None,
+            allow: vec![],
+            overrides: vec![],
+            cancel: &GO_ON,
+            progress: None,
+        };
         change(&mut options);
         load(&self.path(name), &options)
     }
@@ -645,7 +651,14 @@ fn options_reach_the_reader() {
     let tell = |done, total| told.lock().expect("nothing panics here").push((done, total));
     let tell: &(dyn Fn(u64, u64) + Sync) = &tell;
     let stop = AtomicBool::new(false);
-    let options = LoadOptions { reader: Reader::Own, smooth: None, allow: vec![], overrides: vec![], cancel: &stop, progress: Some(tell) };
+    let options = LoadOptions {
+        reader: Reader::Own,
+        smooth: None,
+        allow: vec![],
+        overrides: vec![],
+        cancel: &stop,
+        progress: Some(tell),
+    };
     load(&folder.path("a.toml"), &options).expect("it is good");
     let total = 2 * (TRIANGLE.len() + BOX.len()) as u64;
     let told = told.lock().expect("nothing panics here");

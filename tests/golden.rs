@@ -84,7 +84,14 @@ const LARGE: &[&str] =
 
 fn load(file: &str) -> Loaded {
     let cancel = AtomicBool::new(false);
-    let options = LoadOptions { reader: Reader::Own, smooth: None, allow: vec![], overrides: vec![], cancel: &cancel, progress: None };
+    let options = LoadOptions {
+        reader: Reader::Own,
+        smooth: None,
+        allow: vec![],
+        overrides: vec![],
+        cancel: &cancel,
+        progress: None,
+    };
     let loaded = scene::load(&Path::new("scenes").join(file), &options).unwrap_or_else(|e| panic!("{e}"));
     assert!(loaded.diagnostics.is_empty() && loaded.warnings.is_empty(), "{file} has warnings: see tison check");
     loaded

@@ -12,7 +12,15 @@ use tison::scene::obj::{MtlMaterial, ObjFile, ReadOptions, Reader, Uv, read};
 static GO_ON: AtomicBool = AtomicBool::new(false);
 
 fn options(allow: &[PathBuf]) -> ReadOptions<'_> {
-    ReadOptions { reader: Reader::Own, normals: true, uv: Uv::Always, materials: true, allow, cancel: &GO_ON, progress: None }
+    ReadOptions {
+        reader: Reader::Own,
+        normals: true,
+        uv: Uv::Always,
+        materials: true,
+        allow,
+        cancel: &GO_ON,
+        progress: None,
+    }
 }
 
 fn load(path: &Path) -> Result<ObjFile, Error> {

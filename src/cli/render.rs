@@ -181,8 +181,7 @@ impl Run<'_> {
     fn read(&self) -> Result<Ready, Failure> {
         let plan = self.plan;
         self.progress.stage(Stage::Read);
-        let reading =
-            Reading { reader: plan.reader, smooth: plan.smooth, allow: &plan.allow, defines: &plan.defines };
+        let reading = Reading { reader: plan.reader, smooth: plan.smooth, allow: &plan.allow, defines: &plan.defines };
         let loaded = load(&plan.input, &reading, self.control, &self.progress)?;
         let mut notices = Notice::about(&loaded);
         let settings = Settings::new(plan, &loaded.render)?;

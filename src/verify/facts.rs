@@ -5,10 +5,10 @@
 //! the origin, and evaluates edge functions whose terms are products of that distance, a side and the direction. Divided by the side,
 //! each of some ten roundings moves the side by as much again. So whether a ray that passes a side within
 //!
-//! > `slack = 8 · 2⁻²⁴ · reach` (four ulps of the distance)
+//! > `slack = 16 · 2⁻²⁴ · reach` (eight ulps of the distance)
 //!
 //! hits is not for f32 to decide. The same moves the corners against each other: the normal is off by up to `tilt = slack / height`,
-//! with the least height of the triangle, and by `8 · 2⁻²⁴ · longest side / height` more for what the cross product of a sliver's
+//! with the least height of the triangle, and by `16 · 2⁻²⁴ · longest side / height` more for what the cross product of a sliver's
 //! sides loses. Along the ray the hit is off by up to `slack / |cos|` for an angle between ray and normal whose cosine is
 //! well above `tilt`; twice that is allowed. Below `2 tilt` the ray may as well lie in the plane: its `t` is a quotient of
 //! two roundings and can be anything. A placed mesh adds what its transform rounds ([`placement`]).
@@ -25,7 +25,10 @@ use glam::{Affine3A, DAffine3, DMat3, DVec2, DVec3, Vec3};
 /// Half an f32 ulp of 1.
 const EPS: f64 = 0.5 * f32::EPSILON as f64;
 /// Roundings between a ray, a corner and a side's edge function, each of half an ulp of the distance.
-const ROUNDINGS: f64 = 8.0;
+const ROUNDINGS: f64 = 16.0;
+/// The same for the distance of a plane from an end of the ray: the corners are near then, and a ray that starts four
+/// of them off a surface never meets it.
+const END_ROUNDINGS: f64 = 2.0;
 
 /// On which side of its boundary a ray meets a primitive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,12 +56,7 @@ pub(super) struct Facts {
 }
 
 impl Facts {
-    const NOTHING: Self = Self {
-        side: Side::Out,
-        t: Range { lo: f64::INFINITY, hi: f64::NEG_INFINITY },
-        normal_slack: 0.0,
-        margin: f64::INFINITY,
-    };
+    const NOTHING: Self = Self { side: Side::Out, t: Range::NONE, normal_slack: 0.0, margin: f64::MAX };
 
     /// Whether a hit may be reported at `t`.
     pub(super) fn allows(&self, t: f32) -> bool {
@@ -75,9 +73,14 @@ pub(super) struct Range {
 
 impl Range {
     const ALL: Self = Self { lo: f64::NEG_INFINITY, hi: f64::INFINITY };
+    const NONE: Self = Self { lo: f64::INFINITY, hi: f64::NEG_INFINITY };
 
     pub(super) fn around(t: f64, slack: f64) -> Self {
         Self { lo: t - slack, hi: t + slack }
+    }
+
+    fn extend(&mut self, t: f64) {
+        *self = Self { lo: self.lo.min(t), hi: self.hi.max(t) };
     }
 
     pub(super) fn length(self) -> f64 {
@@ -161,7 +164,7 @@ fn placement(instance: &Instance, ray: &Ray, local: [DVec3; 3], placed: [DVec3; 
     let own = local.iter().fold(DVec3::ZERO, |m, p| m.max(p.abs()));
     let matrix = size(&there.matrix3) * own + there.translation.abs();
     let in_local = largest_distance(back.transform_point3(o), &local);
-    let test = (size(&there.matrix3) * DVec3::splat(ROUNDINGS * EPS * in_local)).max_element();
+    let test = (size(&there.matrix3) * DVec3::splat(slack_at(in_local))).max_element();
     let slack = 4.0 * (off + EPS * (4.0 * sums + matrix)).max_element() + test;
     let cofactors = cofactors(&there.matrix3);
     let ng = (local[1] - local[0]).cross(local[2] - local[0]).normalize_or_zero();
@@ -178,7 +181,7 @@ fn of_triangle(ray: &Ray, p: [DVec3; 3], rounding: &Rounding) -> Facts {
     let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
     let ng = (p[1] - p[0]).cross(p[2] - p[0]);
     let (Some(normal), Some(along)) = (ng.try_normalize(), d.try_normalize()) else { return Facts::NOTHING };
-    let slack = ROUNDINGS * EPS * largest_distance(o, &p) + rounding.slack;
+    let slack = slack_at(largest_distance(o, &p)) + rounding.slack;
     let longest = (0..3).map(|i| (p[i] - p[(i + 1) % 3]).length()).fold(0.0, f64::max);
     let height = ng.length() / longest;
     let normal_slack = slack / height + ROUNDINGS * EPS * sliver(p).max(rounding.sliver) + rounding.normal;
@@ -191,7 +194,9 @@ fn of_triangle(ray: &Ray, p: [DVec3; 3], rounding: &Rounding) -> Facts {
     let edge_on = cos <= 2.0 * normal_slack;
     let t_slack = slack / (0.5 * cos * d.length());
     let range = if edge_on { Range::ALL } else { Range::around(t, t_slack) };
-    let (near, far) = (f64::from(ray.t_near), f64::from(ray.t_far));
+    // How far the hit is inside the interval, in units of what its ends are told apart by.
+    let end_slack = slack * END_ROUNDINGS / ROUNDINGS / (cos * d.length());
+    let from_end = (t - f64::from(ray.t_near)).min(f64::from(ray.t_far) - t) / end_slack;
     // Sides whose edge functions may have either sign.
     let unclear = |i: usize| {
         let j = (i + 1) % 3;
@@ -200,14 +205,14 @@ fn of_triangle(ray: &Ray, p: [DVec3; 3], rounding: &Rounding) -> Facts {
     let in_line = edge_on && (0..3).filter(|&i| unclear(i)).count() >= 2;
     let side = if in_line {
         Side::EdgeOn
-    } else if inside < -1.0 || range.hi < near || range.lo > far {
+    } else if inside < -1.0 || from_end < -1.0 {
         Side::Out
-    } else if inside <= 1.0 || range.lo <= near || range.hi >= far {
+    } else if inside <= 1.0 || from_end <= 1.0 {
         Side::Boundary
     } else {
         Side::In
     };
-    Facts { side, t: range, normal_slack, margin: inside.abs() }
+    Facts { side, t: range, normal_slack, margin: inside.abs().min(from_end.abs()) }
 }
 
 /// Distance of the origin from the boundary of a triangle, negative outside.
@@ -228,39 +233,47 @@ fn signed_distance(p: [DVec2; 3]) -> f64 {
 fn of_shape<S: ShapeSet>(set: &S, prim: u32, ray: &Ray) -> Facts {
     /// Roundings of `t` that both backends may make.
     const T_ROUNDINGS: f64 = 4.0;
+    /// Shares of the slack at which rays are tried.
+    const SHARES: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
     let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
     let Some(along) = d.try_normalize() else { return Facts::NOTHING };
-    let slack = ROUNDINGS * EPS * largest_distance(o, &corners(&set.bounds(prim)));
+    let bounds = set.bounds(prim);
+    let slack = slack_at(largest_distance(o, &corners(&bounds)));
+    // Rays beside this one start where it does: what it leaves must not come in between. They are apart by the slack
+    // where the shape is.
+    let distance = (bounds.center() - o).dot(along).max(bounds.size().max_element() / 8.0);
+    let turn = slack / distance * d.length();
     let (near, far) = (f64::from(ray.t_near), f64::from(ray.t_far));
-    let hit = |o: DVec3| set.hit(prim, o, d, near, far);
-    let exact = hit(o);
-    let beside = beside(o, along, slack).map(hit);
-    let all = beside.iter().copied().chain([exact]);
-    let (lo, hi) = all.clone().flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
-    let side = match all.clone().flatten().count() {
-        0 => Side::Out,
-        9 => Side::In,
-        _ => Side::Boundary,
-    };
-    let close = |t: f64, end: f64| (t - end).abs() <= slack / d.length();
-    let side = match exact {
-        Some(t) if close(t, near) || close(t, far) => Side::Boundary,
-        _ => side,
+    let exact = set.hit(prim, o, d, near, far);
+    let (mut margin, mut range) = (None, Range::NONE);
+    exact.iter().for_each(|&t| range.extend(t));
+    for share in SHARES {
+        let hits = beside(d, along, share * turn).map(|d| set.hit(prim, o, d, near, far));
+        hits.iter().flatten().for_each(|&t| range.extend(t));
+        if hits.iter().any(|hit| hit.is_some() != exact.is_some()) {
+            margin.get_or_insert(share);
+        }
+    }
+    let close = |end: f64| exact.is_some_and(|t| end.is_finite() && (t - end).abs() <= T_ROUNDINGS * EPS * end);
+    let side = match (margin, exact) {
+        (Some(_), _) => Side::Boundary,
+        _ if close(near) || close(far) => Side::Boundary,
+        (None, Some(_)) => Side::In,
+        (None, None) => Side::Out,
     };
     let t = match (side, exact) {
         (Side::In, Some(t)) => Range::around(t, T_ROUNDINGS * EPS * t.abs()),
-        _ => Range { lo, hi },
+        _ => range,
     };
-    let margin = if side == Side::Boundary { 0.5 } else { f64::INFINITY };
-    Facts { side, t, normal_slack: ROUNDINGS * EPS, margin }
+    Facts { side, t, normal_slack: ROUNDINGS * EPS, margin: margin.unwrap_or(1.0) }
 }
 
-/// Eight origins around `o` at distance `by`, across the direction.
-pub(super) fn beside(o: DVec3, along: DVec3, by: f64) -> [DVec3; 8] {
+/// Eight vectors around `v`, off by `by` across the direction.
+pub(super) fn beside(v: DVec3, along: DVec3, by: f64) -> [DVec3; 8] {
     let (x, y) = along.any_orthonormal_pair();
     std::array::from_fn(|i| {
         let (sin, cos) = (i as f64 * std::f64::consts::FRAC_PI_4).sin_cos();
-        o + by * (cos * x + sin * y)
+        v + by * (cos * x + sin * y)
     })
 }
 

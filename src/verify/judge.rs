@@ -167,12 +167,11 @@ impl<A: Backend, B: Backend> Judge<'_, A, B> {
 
     /// Something is in the way by one answer, but no nearest hit says what: rays beside this one may.
     fn beside(&self, ray: &Ray) -> Verdict {
-        let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
-        let bounds = self.scene.local_bounds();
-        let reach = (bounds.lo - o).abs().max((bounds.hi - o).abs()).length();
+        let d = ray.d.as_dvec3();
         let Some(along) = d.try_normalize() else { return Verdict::real(0.0) };
-        for origin in facts::beside(o, along, facts::slack_at(reach)) {
-            let moved = Ray { o: origin.as_vec3(), ..*ray };
+        // Turned, not moved: what the ray leaves must not come in between.
+        for turned in facts::beside(d, along, facts::slack_at(d.length())) {
+            let moved = Ray { d: turned.as_vec3(), ..*ray };
             let hits = [self.first.intersect(&moved), self.second.intersect(&moved)];
             for facts in hits.into_iter().flatten().map(|hit| self.facts(ray, &hit)) {
                 match facts.side {

@@ -96,8 +96,7 @@ enum Job {
     Aimed(Group, u64),
 }
 
-const AIMED: [Group; 5] =
-    [Group::Vertices, Group::Edges, Group::Silhouettes, Group::Interiors, Group::Chords];
+const AIMED: [Group; 5] = [Group::Vertices, Group::Edges, Group::Silhouettes, Group::Interiors, Group::Chords];
 
 /// The picture in squares.
 fn parts((width, height): (u32, u32)) -> Vec<Part> {

@@ -93,10 +93,7 @@ fn outlines(mesh: &TriangleMesh, seed: u32) -> Vec<Outline> {
     };
     let mut sides: Vec<([u32; 2], u32)> = faces.par_iter().enumerate().flat_map_iter(sides).collect();
     sides.par_sort_unstable();
-    let of_edge = |same: &[([u32; 2], u32)]| Outline {
-        edge: same[0].0,
-        face: same[0].1,
-        other: same.get(1).map(|side| side.1),
-    };
+    let of_edge =
+        |same: &[([u32; 2], u32)]| Outline { edge: same[0].0, face: same[0].1, other: same.get(1).map(|side| side.1) };
     sides.chunk_by(|a, b| a.0 == b.0).map(of_edge).collect()
 }

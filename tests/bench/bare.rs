@@ -25,7 +25,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
     let model = args.model()?;
     let cancel = AtomicBool::new(false);
-    let options = LoadOptions { reader: Reader::Own, smooth: None, allow: vec![], overrides: vec![], cancel: &cancel, progress: None };
+    let options = LoadOptions {
+        reader: Reader::Own,
+        smooth: None,
+        allow: vec![],
+        overrides: vec![],
+        cancel: &cancel,
+        progress: None,
+    };
     let mut scene = scene::load(&model, &options)?.scene;
     let aspect = f64::from(args.size.0) / f64::from(args.size.1);
     let camera = scene.auto_camera(View::ThreeQuarter, &args.camera, aspect)?;

@@ -14,7 +14,14 @@ pub fn load(toml: &str) -> Loaded {
     let path = dir.path().join("scene.toml");
     std::fs::write(&path, format!("tison = 1\n{toml}")).expect("a file in it");
     let cancel = AtomicBool::new(false);
-    let options = LoadOptions { reader: Reader::Own, smooth: None, allow: vec![], overrides: vec![], cancel: &cancel, progress: None };
+    let options = LoadOptions {
+        reader: Reader::Own,
+        smooth: None,
+        allow: vec![],
+        overrides: vec![],
+        cancel: &cancel,
+        progress: None,
+    };
     scene::load(&path, &options).unwrap_or_else(|e| panic!("{e}\n{toml}"))
 }
 

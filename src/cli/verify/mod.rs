@@ -176,7 +176,8 @@ impl<'a> Run<'a, '_> {
             (None, None) => own,
         };
         if size.0.max(size.1) > limits::MAX_SIDE {
-            let what = format!("a picture of {}x{} pixels: no side may be longer than {}", size.0, size.1, limits::MAX_SIDE);
+            let what =
+                format!("a picture of {}x{} pixels: no side may be longer than {}", size.0, size.1, limits::MAX_SIDE);
             return Err(Failure::new(Exit::Limit, what).help("choose a smaller --size, or fewer --rays"));
         }
         Ok((size.0 as u32, size.1 as u32))

@@ -85,7 +85,8 @@ pub(super) fn line_of_triangle(
     let sampling = Sampling::of_file(source.len);
     let jobs = || vec![(); pieces.ranges.len()];
     let start = |i: usize| pieces.ranges[i].start;
-    let surveys = pieces.each(jobs(), &[], |i, (), text, joined| Ok(survey::survey(text, start(i), joined, sampling)))?;
+    let surveys =
+        pieces.each(jobs(), &[], |i, (), text, joined| Ok(survey::survey(text, start(i), joined, sampling)))?;
     let (before, _) = running_totals(&surveys);
     let places = pieces.each(jobs(), &surveys, |i, (), text, _| {
         let here = before[i].triangles..before[i].triangles + surveys[i].tally.triangles;

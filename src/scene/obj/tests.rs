@@ -10,7 +10,15 @@ use std::fmt::Write as _;
 static GO_ON: AtomicBool = AtomicBool::new(false);
 
 fn options() -> ReadOptions<'static> {
-    ReadOptions { reader: Reader::Own, normals: true, uv: Uv::Always, materials: true, allow: &[], cancel: &GO_ON, progress: None }
+    ReadOptions {
+        reader: Reader::Own,
+        normals: true,
+        uv: Uv::Always,
+        materials: true,
+        allow: &[],
+        cancel: &GO_ON,
+        progress: None,
+    }
 }
 
 fn parse_in(bytes: &[u8], piece: u64) -> Result<ObjFile, Error> {
