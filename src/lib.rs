@@ -6,6 +6,7 @@
 //!
 //! | room | job |
 //! |---|---|
+//! | [`bench`](mod@bench) | how right and how fast all that is, measured |
 //! | [`render`] | tiles, waves of rays, shading |
 //! | [`backend`] | the seam: who answers a ray |
 //! | [`film`] | pixels in, files out |
@@ -25,6 +26,7 @@
 #![warn(missing_docs)]
 
 pub mod backend;
+pub mod bench;
 #[cfg(feature = "embree")]
 #[allow(unsafe_code, reason = "the one room that talks to C")]
 pub mod embree;
