@@ -7,6 +7,7 @@
 //! | room | job |
 //! |---|---|
 //! | [`verify`] | the same rays through both backends, the same file through both readers |
+//! | [`bench`](mod@bench) | how right and how fast all that is, measured |
 //! | [`render`] | tiles, waves of rays, shading |
 //! | [`backend`] | the seam: who answers a ray |
 //! | [`film`] | pixels in, files out |
@@ -26,6 +27,7 @@
 #![warn(missing_docs)]
 
 pub mod backend;
+pub mod bench;
 #[cfg(feature = "embree")]
 #[allow(unsafe_code, reason = "the one room that talks to C")]
 pub mod embree;

@@ -1,6 +1,6 @@
 //! Which backend answers, chosen once per render.
 
-use super::native;
+use super::{Backend, native};
 use crate::scene::Scene;
 use std::sync::atomic::AtomicBool;
 
@@ -122,6 +122,16 @@ impl AnyBackend {
                 let build = native::BuildOptions { quality, cancel: options.cancel };
                 Ok(Self::Native(native::Native::build(&scene.objects, &build)?))
             }
+        }
+    }
+
+    /// Whichever it is, for who sends too few rays to be compiled once per backend.
+    #[must_use]
+    pub fn as_dyn(&self) -> &dyn Backend {
+        match self {
+            #[cfg(feature = "embree")]
+            Self::Embree(b) => b,
+            Self::Native(b) => b,
         }
     }
 

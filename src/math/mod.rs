@@ -1,6 +1,7 @@
-//! Floats, colour, samples. Knows nothing of rays or scenes.
+//! Floats, long numbers, colour, samples. Knows nothing of rays or scenes.
 
 pub mod colour;
+pub mod dd;
 mod frame;
 mod pow;
 mod sampling;

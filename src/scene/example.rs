@@ -12,6 +12,7 @@ pub use ember::{write_ember_materials, write_ember_scene};
 
 use std::io::{self, Write};
 
+use crate::geom::TriangleMesh;
 use geodesic::Geodesic;
 use rayon::prelude::*;
 use rock::Rock;
@@ -67,6 +68,31 @@ pub fn write_mesh(triangles: u64, out: &mut dyn Write) -> io::Result<MeshCounts>
     write_lines(became, out, |t, line| text::push_face(line, grid.triangle(t), 1))?;
     out.flush()?;
     Ok(counts)
+}
+
+/// Surface of a ball of triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Surface {
+    /// The unit sphere.
+    Round,
+    /// The lava rock of [`write_mesh`].
+    Rock,
+}
+
+/// The ball of [`write_mesh`] as a mesh, or a smooth one of as many triangles; closed, every edge shared by two.
+///
+/// At most 2^31 triangles are made, whatever is asked for.
+#[must_use]
+pub fn mesh(triangles: u64, surface: Surface) -> TriangleMesh {
+    let grid = Geodesic::nearest(triangles.min(1 << 31)).expect("that few can be numbered");
+    let (MeshCounts { vertices, triangles }, rock) = (grid.counts(), Rock::new(grid.frequency()));
+    let point = |id| match surface {
+        Surface::Round => grid.direction(id),
+        Surface::Rock => rock.point(grid.direction(id)),
+    };
+    let points: Vec<[f32; 3]> = (0..vertices).into_par_iter().map(|id| point(id).as_vec3().to_array()).collect();
+    let faces = (0..triangles).into_par_iter().map(|t| grid.triangle(t).map(|id| id as u32)).collect();
+    TriangleMesh::new(points.into_flattened(), faces)
 }
 
 /// Writes the lines `0..count` in order; `push` appends one line, on any thread.

@@ -20,6 +20,7 @@ fn off_surface(solid: Solid, q: DVec3) -> f64 {
             if capped { wall.min(cap) } else { wall }
         }
         Solid::Quad(half) => q.z.abs() + outside(half[0], q.x) + outside(half[1], q.y),
+        Solid::Triangle(_) => unreachable!("a triangle is no shape of its own"),
     }
 }
 

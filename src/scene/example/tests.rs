@@ -254,3 +254,21 @@ fn the_first_scene_has_one_of_each_and_nothing_odd() {
     assert!(scene.cameras[0].camera.aperture > 0.0 && scene.lights.iter().any(|l| l.radius > 0.0));
     assert!(scene.materials.iter().all(|m| scene.objects.iter().any(|o| o.material.as_ref() == Some(&m.name))));
 }
+
+#[test]
+fn the_mesh_in_memory_is_the_one_written() {
+    let (counts, text) = mesh(2_000);
+    let Parsed { points, faces, .. } = parse(&text);
+    let made = super::mesh(2_000, Surface::Rock);
+    assert_eq!((made.vertex_count() as u64, made.face_count() as u64), (counts.vertices, counts.triangles));
+    assert_eq!(made.faults().total(), 0);
+    // Readers may number the points as they come.
+    for (made_face, face) in made.faces().iter().zip(&faces) {
+        for (a, b) in made_face.map(|i| made.point(i)).iter().zip(face.map(|i| points[i as usize])) {
+            assert!((a.as_dvec3() - b).length() < 2e-6, "{a} for {b}");
+        }
+    }
+    let round = super::mesh(2_000, Surface::Round);
+    assert_eq!(round.faces(), made.faces());
+    assert!((0..round.vertex_count() as u32).all(|i| (round.point(i).length() - 1.0).abs() < 2e-7));
+}

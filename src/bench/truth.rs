@@ -1,23 +1,38 @@
 //! Where a ray meets a shape, the textbook way, in numbers so long that it does not matter.
-use super::dd::{Dd, V, dd};
+//!
+//! It shares no formula with [`geom`](crate::geom): what both say is right.
+
+use crate::math::dd::{Dd, Dd3, dd};
 use glam::{DAffine3, DVec3};
 
+/// A shape of size about 1 around the origin of its own space.
 #[derive(Clone, Copy, Debug)]
 pub enum Solid {
+    /// Radius 1.
     Sphere,
+    /// Half sizes.
     Cube([f64; 3]),
-    Cylinder { half: f64, capped: bool },
+    /// Radius 1 around the z axis.
+    Cylinder {
+        /// Half the height.
+        half: f64,
+        /// Whether it has lids.
+        capped: bool,
+    },
+    /// Half sizes, in the plane z = 0.
     Quad([f64; 2]),
+    /// Corners.
+    Triangle([DVec3; 3]),
 }
 
 /// One place where the line meets the surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Crossing {
-    pub t: Dd,
+struct Crossing {
+    t: Dd,
     /// Outward normal in the shape's space.
-    pub n: [Dd; 3],
+    n: [Dd; 3],
     /// How far inside the border of its part of the surface, relative to the shape's size.
-    pub inside: f64,
+    inside: f64,
 }
 
 /// Answer with the margin by which the yes or no is safe.
@@ -29,30 +44,31 @@ pub struct Truth {
     pub margin: f64,
 }
 
-/// Unit shapes (radius 1) under `to_world`.
+/// What a ray from `o` along `d` meets first beyond `t_near` of `solid` as `to_world` places it.
+#[must_use]
 pub fn truth(solid: Solid, to_world: &DAffine3, o: DVec3, d: DVec3, t_near: f64) -> Truth {
-    let columns = [to_world.matrix3.x_axis, to_world.matrix3.y_axis, to_world.matrix3.z_axis].map(V::of);
+    let columns = [to_world.matrix3.x_axis, to_world.matrix3.y_axis, to_world.matrix3.z_axis].map(Dd3::of);
     let [x, y, z] = columns;
     let cofactors = [y.cross(z), z.cross(x), x.cross(y)];
     let det = x.dot(cofactors[0]);
-    let take_back = |v: V| cofactors.map(|c| c.dot(v) / det);
-    let local_o = take_back(V::of(o).sub(V::of(to_world.translation)));
-    let local_d = take_back(V::of(d));
+    let take_back = |v: Dd3| cofactors.map(|c| c.dot(v) / det);
+    let local_o = take_back(Dd3::of(o) - Dd3::of(to_world.translation));
+    let local_d = take_back(Dd3::of(d));
     let (crossings, silhouette) = crossings(solid, local_o, local_d);
     let mut margin = silhouette;
     let mut hit: Option<Crossing> = None;
     for c in crossings {
-        let scale = c.t.abs().to_f64() * V(local_d).length().to_f64() + 1.0;
+        let scale = c.t.abs().to_f64() * Dd3(local_d).length().to_f64() + 1.0;
         margin = margin.min(c.inside.abs());
         // Right at the start of the interval nothing is decidable.
-        margin = margin.min((c.t - dd(t_near)).to_f64().abs() * V(local_d).length().to_f64() / scale * 1e3);
+        margin = margin.min((c.t - dd(t_near)).to_f64().abs() * Dd3(local_d).length().to_f64() / scale * 1e3);
         if c.inside >= 0.0 && c.t > dd(t_near) && hit.is_none_or(|h| c.t < h.t) {
             hit = Some(c);
         }
     }
     let hit = hit.map(|h| {
         let [a, b, c] = cofactors;
-        let n = a.scale(h.n[0]).add(b.scale(h.n[1])).add(c.scale(h.n[2]));
+        let n = a.scale(h.n[0]) + b.scale(h.n[1]) + c.scale(h.n[2]);
         let sign = if det < dd(0.0) { dd(-1.0) } else { dd(1.0) };
         (h.t.to_f64(), n.scale(sign / n.length()).to_f64())
     });
@@ -110,7 +126,22 @@ fn crossings(solid: Solid, o: [Dd; 3], d: [Dd; 3]) -> (Vec<Crossing>, f64) {
             let inside = (1.0 - p[0].abs().to_f64() / half[0]).min(1.0 - p[1].abs().to_f64() / half[1]);
             (vec![Crossing { t, n: [zero, zero, dd(1.0)], inside }], f64::INFINITY)
         }
+        Solid::Triangle(corners) => (triangle(corners, Dd3(o), Dd3(d)).into_iter().collect(), f64::INFINITY),
     }
+}
+
+/// Where the line meets the plane; the weights of the corners are ratios of areas.
+fn triangle(corners: [DVec3; 3], o: Dd3, d: Dd3) -> Option<Crossing> {
+    let [a, b, c] = corners.map(Dd3::of);
+    let n = (b - a).cross(c - a);
+    let along = n.dot(d);
+    if along == dd(0.0) {
+        return None;
+    }
+    let t = n.dot(a - o) / along;
+    let p = o + d.scale(t);
+    let part = |from: Dd3, to: Dd3| (n.dot((to - from).cross(p - from)) / n.dot(n)).to_f64();
+    Some(Crossing { t, n: n.0, inside: part(a, b).min(part(b, c)).min(part(c, a)) })
 }
 
 /// Roots of `sum (o + t d)^2 = 1` over `axes`, and the discriminant relative to its scale.

@@ -3,15 +3,20 @@
 //! Source: T. J. Dekker, "A Floating-Point Technique for Extending the Available Precision",
 //! Numer. Math. 18, 1971; Y. Hida, X. S. Li, D. H. Bailey, "Library for Double-Double and
 //! Quad-Double Arithmetic", 2000.
+
+use glam::DVec3;
 use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+/// Such a number. What is not finite stays so, but not exactly as in f64.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dd {
     hi: f64,
     lo: f64,
 }
 
+/// `x`, exactly.
+#[must_use]
 pub fn dd(x: f64) -> Dd {
     Dd { hi: x, lo: 0.0 }
 }
@@ -28,15 +33,20 @@ fn renormalised(hi: f64, lo: f64) -> Dd {
 }
 
 impl Dd {
+    /// The nearest f64.
+    #[must_use]
     pub fn to_f64(self) -> f64 {
         self.hi
     }
 
+    /// Without its sign.
+    #[must_use]
     pub fn abs(self) -> Self {
         if self.hi < 0.0 { -self } else { self }
     }
 
     /// Root of what is not negative: one Newton step from f64's.
+    #[must_use]
     pub fn sqrt(self) -> Self {
         if self.hi == 0.0 {
             return dd(0.0);
@@ -100,58 +110,84 @@ impl PartialOrd for Dd {
 
 /// A vector of them.
 #[derive(Clone, Copy, Debug)]
-pub struct V(pub [Dd; 3]);
+pub struct Dd3(
+    /// Its components.
+    pub [Dd; 3],
+);
 
-impl V {
-    pub fn of(v: glam::DVec3) -> Self {
+impl Dd3 {
+    /// `v`, exactly.
+    #[must_use]
+    pub fn of(v: DVec3) -> Self {
         Self(v.to_array().map(dd))
     }
 
-    pub fn to_f64(self) -> glam::DVec3 {
+    /// The nearest in f64.
+    #[must_use]
+    pub fn to_f64(self) -> DVec3 {
         self.0.map(Dd::to_f64).into()
     }
 
-    pub fn map2(self, o: Self, f: impl Fn(Dd, Dd) -> Dd) -> Self {
+    fn map2(self, o: Self, f: impl Fn(Dd, Dd) -> Dd) -> Self {
         Self([f(self.0[0], o.0[0]), f(self.0[1], o.0[1]), f(self.0[2], o.0[2])])
     }
 
-    pub fn add(self, o: Self) -> Self {
-        self.map2(o, Add::add)
-    }
-
-    pub fn sub(self, o: Self) -> Self {
-        self.map2(o, Sub::sub)
-    }
-
+    /// Every component times `s`.
+    #[must_use]
     pub fn scale(self, s: Dd) -> Self {
         Self(self.0.map(|x| x * s))
     }
 
+    /// Scalar product.
+    #[must_use]
     pub fn dot(self, o: Self) -> Dd {
         let p = self.map2(o, Mul::mul).0;
         p[0] + p[1] + p[2]
     }
 
+    /// Vector product.
+    #[must_use]
     pub fn cross(self, o: Self) -> Self {
         let (a, b) = (self.0, o.0);
         Self([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
     }
 
+    /// Euclidean length.
+    #[must_use]
     pub fn length(self) -> Dd {
         self.dot(self).sqrt()
     }
 }
 
-#[test]
-fn thirty_digits_are_right() {
-    let third = dd(1.0) / dd(3.0);
-    let back = (third + third + third - dd(1.0)).to_f64();
-    assert!(back.abs() < 1e-31, "{back:e}");
-    let two = dd(2.0).sqrt();
-    let back = (two * two - dd(2.0)).to_f64();
-    assert!(back.abs() < 1e-30 && (two.lo != 0.0), "{back:e}");
-    // 1 + 1e-25 is told from 1.
-    let small = (dd(1.0) + dd(1e-25)) * (dd(1.0) - dd(1e-25)) - dd(1.0);
-    assert!(small.to_f64().abs() < 1e-31);
-    assert!(dd(1.0) + dd(1e-25) > dd(1.0));
+impl Add for Dd3 {
+    type Output = Self;
+    fn add(self, o: Self) -> Self {
+        self.map2(o, Add::add)
+    }
+}
+
+impl Sub for Dd3 {
+    type Output = Self;
+    fn sub(self, o: Self) -> Self {
+        self.map2(o, Sub::sub)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thirty_digits_are_right() {
+        let third = dd(1.0) / dd(3.0);
+        let back = (third + third + third - dd(1.0)).to_f64();
+        assert!(back.abs() < 1e-31, "{back:e}");
+        let two = dd(2.0).sqrt();
+        let back = (two * two - dd(2.0)).to_f64();
+        assert!(back.abs() < 1e-30 && (two.lo != 0.0), "{back:e}");
+        // 1 + 1e-25 is told from 1.
+        let small = (dd(1.0) + dd(1e-25)) * (dd(1.0) - dd(1e-25)) - dd(1.0);
+        assert!(small.to_f64().abs() < 1e-31);
+        assert!(dd(1.0) + dd(1e-25) > dd(1.0));
+    }
 }
