@@ -7,6 +7,7 @@
 //! | room | job |
 //! |---|---|
 //! | [`render`] | tiles, waves of rays, shading |
+//! | [`probe`] | single rays in f64, exact answers |
 //! | [`backend`] | the seam: who answers a ray |
 //! | [`film`] | pixels in, files out |
 //! | [`scene`] | files in, one frozen scene out |
@@ -31,6 +32,7 @@ pub mod embree;
 pub mod film;
 pub mod geom;
 pub mod math;
+pub mod probe;
 pub mod render;
 pub mod scene;
 #[allow(unsafe_code, reason = "calling a function compiled for instructions that were looked for first")]
