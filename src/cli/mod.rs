@@ -16,6 +16,7 @@ mod notice;
 mod output;
 mod parse;
 mod plan;
+mod probe;
 mod progress;
 mod render;
 mod report;
@@ -73,6 +74,7 @@ fn run(cli: Cli) -> Exit {
         Some(Command::Render(args)) => plan::Plan::new(&args).and_then(|plan| render::render(&plan, &messages)),
         Some(Command::Info(args)) => info::info(&args, &messages),
         Some(Command::Check(args)) => info::check(&args, &messages),
+        Some(Command::Probe(args)) => probe::probe(&args, &messages),
         Some(Command::Example { name }) => example::example(name.as_ref(), &messages),
         Some(Command::Completions { shell }) => output::print_with(|out| {
             clap_complete::generate(shell, &mut Cli::command(), "tison", out);

@@ -306,7 +306,7 @@ fn notes(plan: &Plan, settings: &Settings, backend: &AnyBackend) -> Notes {
     }
 }
 
-fn build_failure(e: &backend::Error) -> Failure {
+pub fn build_failure(e: &backend::Error) -> Failure {
     let exit = match e {
         backend::Error::NotCompiledIn => Exit::Usage,
         #[cfg(feature = "embree")]
