@@ -9,6 +9,7 @@
 //! | [`verify`] | the same rays through both backends, the same file through both readers |
 //! | [`bench`](mod@bench) | how right and how fast all that is, measured |
 //! | [`render`] | tiles, waves of rays, shading |
+//! | [`probe`] | single rays in f64, exact answers |
 //! | [`backend`] | the seam: who answers a ray |
 //! | [`film`] | pixels in, files out |
 //! | [`scene`] | files in, one frozen scene out |
@@ -34,6 +35,7 @@ pub mod embree;
 pub mod film;
 pub mod geom;
 pub mod math;
+pub mod probe;
 pub mod render;
 pub mod scene;
 #[allow(unsafe_code, reason = "calling a function compiled for instructions that were looked for first")]

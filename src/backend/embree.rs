@@ -1,7 +1,7 @@
 //! The backend that asks Embree.
 
 use super::{Backend, BuildOptions, Error};
-use crate::embree::{self, Device, DeviceConfig, Quality, SceneBuilder, SceneOptions};
+use crate::embree::{self, Device, DeviceConfig, ExactBuilder, ExactScene, Quality, SceneBuilder, SceneOptions};
 use crate::geom::{Coherence, Hit, PacketBatch, Ray, RayHitPacket, RayPacket, TriangleMesh};
 use crate::scene::{Object, Scene};
 use crate::with_shapes;
@@ -24,10 +24,9 @@ impl EmbreeBackend {
     /// # Errors
     /// See [`Error`].
     pub fn build(scene: &Scene, options: &BuildOptions<'_>) -> Result<Self, Error> {
-        let device = Device::new(&DeviceConfig { threads: options.threads, ..DeviceConfig::default() })?;
-        let quality = if options.prefers_quick_build(scene) { Quality::Low } else { Quality::Medium };
-        let mut build =
-            Build { device: &device, quality, options, done: 0, total: total(scene), placed: HashMap::new() };
+        let device = device(options.threads)?;
+        let mut build = Build::new(scene, &device, options);
+        let quality = build.quality;
         let scene = build.scene(scene)?;
         Ok(Self { scene, device, quality })
     }
@@ -51,6 +50,31 @@ impl EmbreeBackend {
     }
 }
 
+/// A device that builds with `threads` threads; 0 is all.
+pub(super) fn device(threads: usize) -> Result<Device, Error> {
+    Ok(Device::new(&DeviceConfig { threads, ..DeviceConfig::default() })?)
+}
+
+/// The hierarchy of `scene` for rays in f64 that start within `reach` of the origin along each axis.
+pub(super) fn build_exact(
+    scene: &Scene,
+    device: &Device,
+    reach: f64,
+    options: &BuildOptions<'_>,
+) -> Result<ExactScene, Error> {
+    let mut build = Build::new(scene, device, options);
+    let mut builder = ExactBuilder::new(device, build.options(), reach)?;
+    for object in &scene.objects {
+        match object {
+            Object::Mesh(mesh) => builder.mesh(Arc::clone(&mesh.data.triangles)),
+            Object::Shapes(shapes) => with_shapes!(&shapes.set, set => builder.shapes(Arc::clone(set))),
+            Object::Instance(i) => builder.instance(build.placed(&i.mesh.data.triangles)?, &i.to_scene),
+        }?;
+    }
+    let left = build.total - build.done;
+    build.committed(left, |progress| builder.commit(Some(progress)))
+}
+
 /// A build under way.
 struct Build<'a> {
     device: &'a Device,
@@ -64,7 +88,12 @@ struct Build<'a> {
     placed: HashMap<*const TriangleMesh, Arc<embree::Scene>>,
 }
 
-impl Build<'_> {
+impl<'a> Build<'a> {
+    fn new(scene: &Scene, device: &'a Device, options: &'a BuildOptions<'a>) -> Self {
+        let quality = if options.prefers_quick_build(scene) { Quality::Low } else { Quality::Medium };
+        Self { device, quality, options, done: 0, total: total(scene), placed: HashMap::new() }
+    }
+
     /// Ids count up as geometries are added: an object's is its index.
     fn scene(&mut self, scene: &Scene) -> Result<embree::Scene, Error> {
         let mut builder = self.builder()?;
@@ -90,20 +119,32 @@ impl Build<'_> {
         Ok(built)
     }
 
+    fn options(&self) -> SceneOptions {
+        SceneOptions { quality: self.quality, ..SceneOptions::default() }
+    }
+
     fn builder(&self) -> Result<SceneBuilder, Error> {
-        let options = SceneOptions { quality: self.quality, ..SceneOptions::default() };
-        Ok(SceneBuilder::new(self.device, options)?)
+        Ok(SceneBuilder::new(self.device, self.options())?)
     }
 
     /// Builds a hierarchy over `primitives`.
     fn commit(&mut self, builder: SceneBuilder, primitives: usize) -> Result<embree::Scene, Error> {
+        self.committed(primitives, |progress| builder.commit(Some(progress)))
+    }
+
+    /// The same, as `commit` does it.
+    fn committed<T>(
+        &mut self,
+        primitives: usize,
+        commit: impl FnOnce(&(dyn Fn(f64) -> bool + Sync)) -> Result<T, embree::Error>,
+    ) -> Result<T, Error> {
         let progress = |share: f64| {
             if let Some(tell) = self.options.progress {
                 tell((self.done as f64 + share * primitives as f64) / self.total as f64);
             }
             !self.options.cancel.load(Relaxed)
         };
-        let built = builder.commit(Some(&progress))?;
+        let built = commit(&progress)?;
         self.done += primitives;
         Ok(built)
     }

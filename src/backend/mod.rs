@@ -3,9 +3,11 @@
 mod any;
 #[cfg(feature = "embree")]
 pub mod embree;
+mod exact;
 pub mod native;
 
 pub use any::{AnyBackend, BackendKind, BuildOptions, Error};
+pub use exact::{ExactBackend, ExactMaker};
 
 use crate::geom::{Coherence, Hit, PacketBatch, Ray, RayHitPacket, RayPacket};
 

@@ -11,6 +11,7 @@ use crate::geom::{Coherence, Hit, PacketBatch, Ray, RayHitPacket, RayPacket, Tri
 use crate::render::{self, Control, Crop, Job};
 use crate::scene::desc::LensSampler;
 use crate::scene::example::{self, Surface};
+use crate::scene::obj::Reader;
 use crate::scene::{self, CameraDesc, Light, LoadOptions, Loaded, Material, Projection, Reflect};
 use glam::{DVec2, DVec3, Vec3};
 use std::fmt::Write;
@@ -231,7 +232,14 @@ fn loaded(body: Body, size: f64, place: Place) -> Result<(Loaded, DVec3), Error>
 /// As [`scene::load`].
 pub fn load(path: &Path) -> Result<Loaded, scene::Error> {
     let cancel = AtomicBool::new(false);
-    let options = LoadOptions { smooth: None, allow: vec![], overrides: vec![], cancel: &cancel, progress: None };
+    let options = LoadOptions {
+        reader: Reader::default(),
+        smooth: None,
+        allow: vec![],
+        overrides: vec![],
+        cancel: &cancel,
+        progress: None,
+    };
     scene::load(path, &options)
 }
 

@@ -1,5 +1,6 @@
 //! The flags as typed. What they mean together is `plan`'s to say.
 
+use super::probe::ProbeArgs;
 use super::{VERSION, parse};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -74,6 +75,8 @@ pub enum Command {
     /// Send the same rays through both backends and read meshes with both readers, and compare
     #[command(after_long_help = super::verify::AFTER_HELP)]
     Verify(super::verify::VerifyArgs),
+    /// Answer single rays exactly: rays on stdin, hits on stdout
+    Probe(ProbeArgs),
     /// Write an example; without a name, list them
     Example {
         #[command(subcommand)]
@@ -368,7 +371,7 @@ fn lens_sampler() -> impl TypedValueParser<Value = LensSampler> {
 /// Both names are known in every binary, so that one without Embree can say so.
 const BACKENDS: [BackendKind; 2] = [BackendKind::Embree, BackendKind::Native];
 
-fn backend() -> impl TypedValueParser<Value = BackendKind> {
+pub fn backend() -> impl TypedValueParser<Value = BackendKind> {
     PossibleValuesParser::new(BACKENDS.map(BackendKind::name))
         .map(|name| BACKENDS.into_iter().find(|b| b.name() == name).expect("only their names are possible"))
 }

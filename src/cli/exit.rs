@@ -61,6 +61,8 @@ pub enum Place {
     Unknown,
     /// A path, and line and column from 1.
     Text(PathBuf, u64, u64),
+    /// A line of a stream, its number and the column, both from 1.
+    Line(String, u64, u64),
     /// Mistakes in a scene file, which say themselves what and where.
     Scene(Vec<Diagnostic>),
 }

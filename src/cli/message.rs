@@ -74,6 +74,7 @@ fn describe(failure: &Failure, style: Style) -> String {
         Place::Text(path, line, column) => {
             out.extend(source_line(path, *line).map(|text| excerpt(&text, *line, *column, style)));
         }
+        Place::Line(text, line, column) => out += &excerpt(text, *line, *column, style),
         Place::Scene(list) => out = list.iter().map(|d| d.render(style.look())).collect::<Vec<_>>().join("\n\n"),
     }
     let mut cause = failure.cause.as_deref().map(|e| e as &dyn Error);

@@ -16,6 +16,7 @@ mod notice;
 mod output;
 mod parse;
 mod plan;
+mod probe;
 mod progress;
 mod render;
 mod report;
@@ -75,6 +76,7 @@ fn run(cli: Cli) -> Exit {
         Some(Command::Info(args)) => info::info(&args, &messages),
         Some(Command::Check(args)) => info::check(&args, &messages),
         Some(Command::Verify(args)) => verify::verify(&args, &messages),
+        Some(Command::Probe(args)) => probe::probe(&args, &messages),
         Some(Command::Example { name }) => example::example(name.as_ref(), &messages),
         Some(Command::Completions { shell }) => output::print_with(|out| {
             clap_complete::generate(shell, &mut Cli::command(), "tison", out);

@@ -199,7 +199,8 @@ impl Plan {
     }
 }
 
-fn backend(asked: Option<BackendKind>) -> Result<BackendKind, Failure> {
+/// The backend asked for, or the default, if it is in this binary.
+pub fn backend(asked: Option<BackendKind>) -> Result<BackendKind, Failure> {
     match asked {
         None => Ok(BackendKind::COMPILED[0]),
         Some(kind) if BackendKind::COMPILED.contains(&kind) => Ok(kind),
@@ -208,7 +209,7 @@ fn backend(asked: Option<BackendKind>) -> Result<BackendKind, Failure> {
     }
 }
 
-fn all_threads() -> usize {
+pub fn all_threads() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 

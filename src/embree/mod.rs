@@ -9,6 +9,7 @@
 //! | `rescale` | directions of a length at which Embree would lose hits |
 //! | `user` | [`PrimSet`]: shapes that Embree calls back for |
 //! | `instance` | scenes placed in others |
+//! | `exact` | scenes for rays in f64: shapes see those, triangles the rounded ones |
 //! | `fault` | panics in those callbacks, kept until Rust code can raise them again |
 //!
 //! It knows `geom` and the crate `embree4-sys`; nothing of the latter leaves this room. What must not happen at the
@@ -33,6 +34,7 @@
 
 mod device;
 mod error;
+mod exact;
 mod fault;
 mod instance;
 mod packet;
@@ -43,6 +45,7 @@ mod user;
 
 pub use device::{Device, DeviceConfig};
 pub use error::Error;
+pub use exact::{ExactBuilder, ExactScene, HitsAlong};
 pub use packet::Width;
 pub use scene::{Quality, Scene, SceneBuilder, SceneOptions};
 pub use user::PrimSet;

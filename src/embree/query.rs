@@ -268,7 +268,7 @@ fn part_of<const W: usize>(rays: &RayPacket, start: usize) -> RayPacket<W> {
 }
 
 #[inline]
-fn c_ray(ray: &Ray) -> sys::RTCRay {
+pub(super) fn c_ray(ray: &Ray) -> sys::RTCRay {
     sys::RTCRay {
         org_x: ray.o.x,
         org_y: ray.o.y,
@@ -294,7 +294,7 @@ fn query_flags(coherence: Coherence) -> sys::RTCRayQueryFlags {
 }
 
 #[inline]
-fn intersect_args(coherence: Coherence) -> sys::RTCIntersectArguments {
+pub(super) fn intersect_args(coherence: Coherence) -> sys::RTCIntersectArguments {
     let mut args = MaybeUninit::uninit();
     // SAFETY: fills the arguments that it is given.
     unsafe { sys::rtcInitIntersectArguments(args.as_mut_ptr()) };

@@ -192,6 +192,11 @@ impl SceneBuilder {
         &self.owner.device
     }
 
+    /// Where panics of callbacks are kept.
+    pub(super) fn fault(&self) -> Arc<Fault> {
+        Arc::clone(&self.owner.fault)
+    }
+
     /// Keeps `data` until the scene has been released.
     pub(super) fn keep(&mut self, data: Arc<dyn Any + Send + Sync>) {
         self.owner.keep.push(data);

@@ -118,7 +118,7 @@ pub(super) unsafe extern "C" fn occluded<S: PrimSet>(args: *const sys::RTCOcclud
 }
 
 #[cold]
-fn unknown_width(n: u32) -> Box<dyn Any + Send> {
+pub(super) fn unknown_width(n: u32) -> Box<dyn Any + Send> {
     Box::new(format!("Embree called back with {n} rays, a number it is not known for"))
 }
 
@@ -195,14 +195,14 @@ impl<S: PrimSet, const N: usize> Kernel for InTheWay<'_, S, N> {
 const ORIGIN: usize = 0;
 const T_NEAR: usize = 3;
 const DIRECTION: usize = 4;
-const T_FAR: usize = 8;
+pub(super) const T_FAR: usize = 8;
 /// Fields of a hit, which follow those of the rays: normal, u and v, then the ids.
 const SURFACE: usize = 12;
 const IDS: usize = 17;
 
 /// Numbers of fields.
 const RAYS_ONLY: usize = SURFACE;
-const WITH_HITS: usize = IDS + 4;
+pub(super) const WITH_HITS: usize = IDS + 4;
 
 const _: () = {
     use std::mem::{offset_of, size_of};
@@ -219,7 +219,7 @@ const _: () = {
 
 /// Embree's memory of the rays of one callback, those of one packet or some of them in another order: `FIELDS` of
 /// `N` words, lane after lane.
-struct Packet<const N: usize, const FIELDS: usize> {
+pub(super) struct Packet<const N: usize, const FIELDS: usize> {
     valid: *const i32,
     words: *mut u32,
 }
@@ -229,12 +229,12 @@ impl<const N: usize, const FIELDS: usize> Packet<N, FIELDS> {
     /// While the packet is in use, `valid` must be `N` numbers, and `words` `FIELDS * N` words that nobody else uses,
     /// those of the rays initialised.
     #[inline(always)]
-    unsafe fn new(valid: *const i32, words: *mut u32) -> Self {
+    pub(super) unsafe fn new(valid: *const i32, words: *mut u32) -> Self {
         Self { valid, words }
     }
 
     #[inline(always)]
-    fn floats(&self, field: usize) -> &[f32; N] {
+    pub(super) fn floats(&self, field: usize) -> &[f32; N] {
         assert!(field < RAYS_ONLY && RAYS_ONLY <= FIELDS);
         // SAFETY: the field is inside the packet.
         let first = unsafe { self.words.add(field * N) };
@@ -250,7 +250,7 @@ impl<const N: usize, const FIELDS: usize> Packet<N, FIELDS> {
 
     /// The active lanes in which `t` is below infinity, if there are any. A NaN is not.
     #[inline(always)]
-    fn found(&self, t: &[f64; N]) -> Option<[bool; N]> {
+    pub(super) fn found(&self, t: &[f64; N]) -> Option<[bool; N]> {
         // SAFETY: the promise of `new`.
         let valid = unsafe { &*self.valid.cast::<[i32; N]>() };
         let mut found = [false; N];
@@ -278,15 +278,28 @@ impl<const N: usize, const FIELDS: usize> Packet<N, FIELDS> {
     }
 }
 
+impl Packet<1, WITH_HITS> {
+    /// Puts a hit without normal, u and v where `found` says so.
+    pub(super) fn put_hit(&mut self, t: f32, ids: [u32; 4], found: &[bool; 1]) {
+        self.put(T_FAR, found, |_| t.to_bits());
+        for field in SURFACE..IDS {
+            self.put(field, found, |_| 0);
+        }
+        for (i, id) in ids.into_iter().enumerate() {
+            self.put(IDS + i, found, |_| id);
+        }
+    }
+}
+
 /// Lower above upper: Embree ignores the primitive.
-const NOTHING: [[f32; 3]; 2] = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
+pub(super) const NOTHING: [[f32; 3]; 2] = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
 
 /// Embree drops what goes beyond 1.844e18, without a word.
 const LARGEST: f64 = 1.8e18;
 
 /// `bounds` as Embree gets them: rounded outwards, two ulps more for the f32 arithmetic of its box test, and never
 /// flat, which a ray in the plane of the box would miss.
-fn outward(bounds: Bounds) -> [[f32; 3]; 2] {
+pub(super) fn outward(bounds: Bounds) -> [[f32; 3]; 2] {
     let (lo, hi) = (bounds.lo, bounds.hi);
     if !lo.cmple(hi).all() {
         return NOTHING;

@@ -1,6 +1,6 @@
-//! A single ray and its answer.
+//! A single ray and its answer, in f32 and in f64.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// "No geometry": what the id of a miss holds, here and in Embree.
 pub const INVALID_ID: u32 = u32::MAX;
@@ -53,6 +53,36 @@ pub struct Hit {
     /// Geometric normal as wound, not unit length.
     pub ng: Vec3,
     /// Primitive within the geometry: for a mesh the face as it stands in the file.
+    pub prim_id: u32,
+    /// Geometry within the scene.
+    pub geom_id: u32,
+}
+
+/// The part `(t_near, t_far)` of the half-line `o + t*d` in f64, for who wants to know exactly.
+///
+/// The interval is open. `d` need not be unit length: `t` counts in units of `|d|`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray64 {
+    /// Origin.
+    pub o: DVec3,
+    /// Direction, any length but zero.
+    pub d: DVec3,
+    /// Start of the interval.
+    pub t_near: f64,
+    /// End of the interval; infinity for a ray without end.
+    pub t_far: f64,
+}
+
+/// Answer of a backend to a [`Ray64`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit64 {
+    /// Ray parameter, as exact as the backend has it.
+    pub t: f64,
+    /// First barycentric of a triangle, as in [`Hit`]; 0 for a shape.
+    pub u: f64,
+    /// Second barycentric.
+    pub v: f64,
+    /// Primitive within the geometry.
     pub prim_id: u32,
     /// Geometry within the scene.
     pub geom_id: u32,

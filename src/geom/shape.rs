@@ -121,6 +121,9 @@ pub enum ShapeError {
         /// As given.
         center: DVec3,
     },
+    /// Coordinates in the world are beyond f64.
+    #[error("it reaches further than numbers do")]
+    TooFar,
     /// An entry of the object-to-world matrix is NaN or infinite.
     #[error("the transform has an entry that is not a finite number")]
     TransformNotFinite,

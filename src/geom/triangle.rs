@@ -54,8 +54,8 @@ impl ShearedRay {
 
     /// `p` has its coordinates in the order of `axes`.
     #[inline]
-    fn project(&self, p: Vec3) -> DVec3 {
-        let q = p.as_dvec3() - self.o;
+    fn project(&self, p: DVec3) -> DVec3 {
+        let q = p - self.o;
         DVec3::new(q.x - self.shear.x * q.z, q.y - self.shear.y * q.z, self.shear.z * q.z)
     }
 }
@@ -95,7 +95,19 @@ pub fn intersect(ray: &ShearedRay, p: [Vec3; 3]) -> Option<TriangleHit> {
 #[inline(always)]
 #[must_use]
 pub fn intersect_permuted(ray: &ShearedRay, p: [Vec3; 3]) -> Option<TriangleHit> {
-    let [a, b, c] = p.map(|q| ray.project(q));
+    intersect_sheared(ray, p.map(|q| ray.project(q.as_dvec3())))
+}
+
+/// As [`intersect`], for corners in f64.
+#[inline]
+#[must_use]
+pub fn intersect_exact(ray: &ShearedRay, p: [DVec3; 3]) -> Option<TriangleHit> {
+    let [x, y, z] = ray.axes;
+    intersect_sheared(ray, p.map(|q| ray.project(DVec3::new(q[x], q[y], q[z]))))
+}
+
+#[inline(always)]
+fn intersect_sheared(ray: &ShearedRay, [a, b, c]: [DVec3; 3]) -> Option<TriangleHit> {
     let u = c.x * b.y - c.y * b.x;
     let v = a.x * c.y - a.y * c.x;
     let w = b.x * a.y - b.y * a.x;
@@ -150,8 +162,15 @@ pub struct Refined {
 #[inline]
 #[must_use]
 pub fn refine(o: Vec3, d: Vec3, p: [Vec3; 3], reported: (f32, f32)) -> Refined {
-    let (o, d) = (o.as_dvec3(), d.as_dvec3());
-    let [p0, p1, p2] = p.map(Vec3::as_dvec3);
+    let reported = (f64::from(reported.0), f64::from(reported.1));
+    refine_exact(o.as_dvec3(), d.as_dvec3(), p.map(Vec3::as_dvec3), reported)
+}
+
+/// As [`refine`], for a ray and corners in f64.
+#[inline]
+#[must_use]
+pub fn refine_exact(o: DVec3, d: DVec3, p: [DVec3; 3], reported: (f64, f64)) -> Refined {
+    let [p0, p1, p2] = p;
     let (e1, e2) = (p1 - p0, p2 - p0);
     let ng = e1.cross(e2);
     let s = o - p0;
@@ -159,7 +178,7 @@ pub fn refine(o: Vec3, d: Vec3, p: [Vec3; 3], reported: (f32, f32)) -> Refined {
     let inv = -1.0 / d.dot(ng);
     let (mut u, mut v) = (e2.dot(q) * inv, -e1.dot(q) * inv);
     if !(u.is_finite() && v.is_finite()) {
-        (u, v) = (f64::from(reported.0), f64::from(reported.1));
+        (u, v) = reported;
     }
     (u, v) = (u.clamp(0.0, 1.0), v.clamp(0.0, 1.0));
     let shrink = 1.0 / (u + v).max(1.0);

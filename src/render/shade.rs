@@ -69,7 +69,7 @@ fn is_closed(scene: &Scene, [object, _]: [u32; 2]) -> bool {
     match shapes.set {
         AnyShapes::Spheres(_) | AnyShapes::PlacedSpheres(_) | AnyShapes::Cubes(_) | AnyShapes::PlacedCubes(_) => true,
         // Open ones are among them.
-        AnyShapes::Cylinders(_) | AnyShapes::Quads(_) => false,
+        AnyShapes::Cylinders(_) | AnyShapes::Quads(_) | AnyShapes::Triangles(_) => false,
     }
 }
 

@@ -23,6 +23,7 @@ mod texture;
 pub use camera::{Camera, CameraDesc, CameraRays, Projection};
 pub use error::{Error, Warning};
 pub use framing::{CameraOverrides, View};
+pub use freeze::OneShape;
 pub use light::Light;
 pub use load::{LoadOptions, Loaded, Unused, load};
 pub use material::{Material, Reflect, Textured};
@@ -126,6 +127,7 @@ impl Scene {
                         AnyShapes::Cubes(_) | AnyShapes::PlacedCubes(_) => &mut c.cubes,
                         AnyShapes::Cylinders(_) => &mut c.cylinders,
                         AnyShapes::Quads(_) => &mut c.quads,
+                        AnyShapes::Triangles(_) => &mut c.triangles,
                     };
                     *count += shapes.set.len() as usize;
                 }

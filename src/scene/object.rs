@@ -2,7 +2,7 @@
 
 use super::obj::CornerData;
 use crate::geom::normal_matrix;
-use crate::geom::{Affine, Bounds, Cube, Cylinder, Plain, Quad, ShapeSet, Sphere, TriangleMesh};
+use crate::geom::{Affine, Bounds, Cube, Cylinder, ExactTriangle, Plain, Quad, ShapeSet, Sphere, TriangleMesh};
 use glam::{DAffine3, DMat3, Vec2, Vec3};
 use std::sync::Arc;
 
@@ -74,7 +74,7 @@ pub struct Shapes {
     pub materials: Vec<u32>,
 }
 
-/// A set of shapes of one class. The plain ones need no transform of their own.
+/// A set of shapes of one class. The plain ones need no transform of their own. No scene file makes the triangles.
 #[derive(Clone, Debug)]
 #[expect(missing_docs, reason = "the classes")]
 pub enum AnyShapes {
@@ -84,6 +84,7 @@ pub enum AnyShapes {
     PlacedCubes(Arc<Affine<Cube>>),
     Cylinders(Arc<Affine<Cylinder>>),
     Quads(Arc<Affine<Quad>>),
+    Triangles(Arc<Plain<ExactTriangle>>),
 }
 
 /// Runs `$body` with `$set` bound to the [`Arc`] of whichever set it is.
@@ -98,6 +99,7 @@ macro_rules! with_shapes {
             $crate::scene::AnyShapes::PlacedCubes($set) => $body,
             $crate::scene::AnyShapes::Cylinders($set) => $body,
             $crate::scene::AnyShapes::Quads($set) => $body,
+            $crate::scene::AnyShapes::Triangles($set) => $body,
         }
     };
 }

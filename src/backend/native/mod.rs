@@ -9,6 +9,7 @@
 //! | `traverse` | the way of a ray through a hierarchy |
 //! | `world` | the hierarchy of the scene; its shapes and placed meshes |
 //! | `placed` | a mesh in a space of its own |
+//! | `exact` | rays in f64 |
 //! | `packet`, `beam`, `wide` | the same for sixteen coherent rays |
 //!
 //! What a ray meets is decided by [`triangle::intersect`](crate::geom::triangle::intersect) and
@@ -28,6 +29,7 @@ mod beam;
 mod bins;
 mod build;
 mod bvh;
+mod exact;
 mod packet;
 mod placed;
 mod ray;
@@ -36,7 +38,7 @@ mod wide;
 mod world;
 
 use super::Backend;
-use crate::geom::{Coherence, Hit, PacketBatch, Ray, RayHitPacket, RayPacket, ShapeError};
+use crate::geom::{Coherence, Hit, Hit64, PacketBatch, Ray, Ray64, RayHitPacket, RayPacket, ShapeError};
 use crate::scene::Object;
 use bvh::MAX_THINGS;
 use core::fmt;
@@ -104,6 +106,13 @@ impl Native {
     /// and more.
     pub fn build(objects: &[Object], options: &BuildOptions<'_>) -> Result<Self, BuildError> {
         Ok(Self { world: World::build(objects, options)? })
+    }
+
+    /// Nearest hit of a ray in f64, inside its open interval; everything is decided in f64. A direction of zero length,
+    /// a number that is not finite and an origin beyond f32 are misses.
+    #[must_use]
+    pub fn intersect_exact(&self, ray: &Ray64) -> Option<Hit64> {
+        self.world.nearest_exact(ray)
     }
 
     /// Bytes of the hierarchies with their copies of the triangles.

@@ -7,7 +7,7 @@ use super::ray::Line;
 use super::traverse::{Best, SMALL_STACK, STACK, Slot, Space, Waiting, Walk};
 use super::{BuildError, BuildOptions};
 use crate::geom::triangle::TriangleHit;
-use crate::geom::{Hit, Ray, ShapeSet};
+use crate::geom::{Hit, Hit64, Ray, ShapeSet};
 use crate::scene::{AnyShapes, MeshData, Object};
 use crate::with_shapes;
 use core::fmt;
@@ -97,6 +97,17 @@ impl World {
         let Apart { object, prim } = self.bvh.apart[self.bvh.apart_index(leaf)?];
         let Thing::Shapes(set) = &self.things[object as usize] else { return None };
         Some(Shape { set, prim, id: self.first[object as usize] + prim })
+    }
+
+    /// The best hit of a ray in f64 as it is reported.
+    pub(super) fn hit_exact(&self, best: &Best) -> Hit64 {
+        let (geom_id, prim_id) = owner(&self.first, best.id);
+        let prim_id = match &self.things[geom_id as usize] {
+            Thing::Mesh | Thing::Shapes(_) => prim_id,
+            Thing::Placed(placed) => best.at.id(&self.meshes[placed.mesh as usize]),
+        };
+        let TriangleHit { t, u, v } = best.hit;
+        Hit64 { t, u, v, prim_id, geom_id }
     }
 
     /// The best hit as it is reported.

@@ -14,9 +14,11 @@ mod place;
 mod placed;
 mod plan;
 mod shapes;
+mod single;
 
 pub use assets::Assets;
 pub use mesh::{MeshFile, Wanted};
+pub use shapes::OneShape;
 
 use super::desc::SceneDesc;
 use super::format::{self, Format, Mistakes};

@@ -1,23 +1,25 @@
 //! Analytic shapes, sorted into sets of one class each.
 
-use crate::geom::{Affine, Bounds, Cube, Cylinder, Plain, Quad, Shape, ShapeError, Sphere};
+use crate::geom::{Affine, Bounds, Cube, Cylinder, ExactTriangle, Plain, Quad, Shape, ShapeError, Sphere, invert};
 use crate::scene::desc::ShapeDesc;
 use crate::scene::{AnyShapes, Shapes};
 use glam::{DAffine3, DVec2, DVec3};
 use std::sync::Arc;
 
 /// A shape in its own space.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(missing_docs, reason = "the classes")]
 pub enum OneShape {
     Sphere(Sphere),
     Cube(Cube),
     Cylinder(Cylinder),
     Quad(Quad),
+    Triangle(ExactTriangle),
 }
 
 impl OneShape {
     /// The shape that `desc` describes; none for a mesh.
-    pub fn of(desc: &ShapeDesc) -> Result<Option<Self>, ShapeError> {
+    pub(super) fn of(desc: &ShapeDesc) -> Result<Option<Self>, ShapeError> {
         Ok(Some(match *desc {
             ShapeDesc::Sphere { center, radius } => Self::Sphere(Sphere::new(center, radius)?),
             ShapeDesc::Cube { half } => Self::Cube(Cube::new(DVec3::ZERO, half)?),
@@ -27,13 +29,15 @@ impl OneShape {
         }))
     }
 
-    /// Its box when it is placed.
+    /// Its box when `to` places it.
+    #[must_use]
     pub fn bounds(&self, to: &DAffine3) -> Bounds {
         match self {
             Self::Sphere(s) => s.bounds(to),
             Self::Cube(s) => s.bounds(to),
             Self::Cylinder(s) => s.bounds(to),
             Self::Quad(s) => s.bounds(to),
+            Self::Triangle(s) => s.bounds(to),
         }
     }
 }
@@ -47,6 +51,7 @@ pub enum Class {
     PlacedCubes,
     Cylinders,
     Quads,
+    Triangles,
 }
 
 /// A set for each class, and the materials of the shapes in it.
@@ -58,6 +63,7 @@ pub struct Sets {
     placed_cubes: (Affine<Cube>, Vec<u32>),
     cylinders: (Affine<Cylinder>, Vec<u32>),
     quads: (Affine<Quad>, Vec<u32>),
+    triangles: (Plain<ExactTriangle>, Vec<u32>),
 }
 
 impl Sets {
@@ -82,7 +88,9 @@ impl Sets {
                     Class::Cubes
                 }
                 None => {
-                    self.placed_cubes.0.push(cube, *to_scene)?;
+                    let translation = to_scene.transform_point3(cube.center());
+                    let centered = Cube::new(DVec3::ZERO, cube.half())?;
+                    self.placed_cubes.0.push(centered, DAffine3 { translation, ..*to_scene })?;
                     Class::PlacedCubes
                 }
             },
@@ -93,6 +101,11 @@ impl Sets {
             OneShape::Quad(quad) => {
                 self.quads.0.push(quad, *to_scene)?;
                 Class::Quads
+            }
+            OneShape::Triangle(triangle) => {
+                invert(to_scene)?;
+                self.triangles.0.push(triangle.under(to_scene));
+                Class::Triangles
             }
         };
         self.materials(class).push(material);
@@ -107,6 +120,7 @@ impl Sets {
             Class::PlacedCubes => &mut self.placed_cubes.1,
             Class::Cylinders => &mut self.cylinders.1,
             Class::Quads => &mut self.quads.1,
+            Class::Triangles => &mut self.triangles.1,
         }
     }
 
@@ -124,6 +138,7 @@ impl Sets {
             Class::PlacedCubes => taken(&mut self.placed_cubes, AnyShapes::PlacedCubes),
             Class::Cylinders => taken(&mut self.cylinders, AnyShapes::Cylinders),
             Class::Quads => taken(&mut self.quads, AnyShapes::Quads),
+            Class::Triangles => taken(&mut self.triangles, AnyShapes::Triangles),
         }
     }
 }
