@@ -1,5 +1,6 @@
 //! The flags as typed. What they mean together is `plan`'s to say.
 
+use super::both::Backends;
 use super::probe::ProbeArgs;
 use super::{VERSION, parse};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -8,7 +9,6 @@ use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use glam::DVec3;
 use std::ffi::OsString;
 use std::path::PathBuf;
-use tison::backend::BackendKind;
 use tison::film::{Aov, Tonemap};
 use tison::scene::desc::LensSampler;
 use tison::scene::obj::Reader;
@@ -177,9 +177,10 @@ pub struct RenderArgs {
     )]
     pub smooth: Option<f64>,
 
-    /// Who answers the rays
-    #[arg(long, value_name = "NAME", value_parser = backend(), help_heading = "Running")]
-    pub backend: Option<BackendKind>,
+    /// Who answers the rays; `both` renders twice and writes IMAGE.native and IMAGE.diff too, the absolute
+    /// difference (in 8-bit formats as bright as it can be)
+    #[arg(long, value_name = "NAME", value_parser = Backends::parser(), help_heading = "Running")]
+    pub backend: Option<Backends>,
     /// Threads to work with [default: all]
     #[arg(
         short = 'j', long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024),
@@ -366,12 +367,4 @@ fn obj_reader() -> impl TypedValueParser<Value = Reader> {
 fn lens_sampler() -> impl TypedValueParser<Value = LensSampler> {
     PossibleValuesParser::new(LensSampler::ALL.map(LensSampler::name))
         .map(|name| LensSampler::ALL.into_iter().find(|s| s.name() == name).expect("only their names are possible"))
-}
-
-/// Both names are known in every binary, so that one without Embree can say so.
-const BACKENDS: [BackendKind; 2] = [BackendKind::Embree, BackendKind::Native];
-
-pub fn backend() -> impl TypedValueParser<Value = BackendKind> {
-    PossibleValuesParser::new(BACKENDS.map(BackendKind::name))
-        .map(|name| BACKENDS.into_iter().find(|b| b.name() == name).expect("only their names are possible"))
 }

@@ -4,6 +4,7 @@
 //! stdout carries only what was asked for; everything else is on stderr.
 
 mod args;
+mod both;
 mod camera;
 mod config;
 mod example;

@@ -2,6 +2,7 @@
 //! reading the scene is refused here; what the scene file may say is settled by `settings`.
 
 use super::args::{CameraArgs, PictureArgs, ProgressMode, ReadingArgs, RenderArgs};
+use super::both::{self, Backends};
 use super::exit::Failure;
 use super::frame::Frame;
 use super::settings::{SIZE, Setting, Settings};
@@ -10,7 +11,6 @@ use super::{camera, config, turntable};
 use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
-use tison::backend::BackendKind;
 use tison::film::{self, Aov};
 use tison::scene::desc::RenderDesc;
 use tison::scene::format;
@@ -38,7 +38,7 @@ pub struct Plan {
     /// Who reads meshes.
     pub reader: Reader,
     /// Who answers the rays.
-    pub backend: BackendKind,
+    pub backend: Backends,
     /// Threads to work with.
     pub threads: usize,
     /// Where the image goes.
@@ -116,13 +116,14 @@ impl Plan {
             verbose: args.verbose,
             strict: args.strict,
             print_config: args.print_config,
-            backend: backend(args.backend)?,
+            backend: Backends::chosen(args.backend)?,
             input,
             outputs,
             stats,
             list: Vec::new(),
         };
         plan.list = config::of_run(args, &plan);
+        plan.backend.check_outputs(&plan.outputs, plan.picture.pixel.is_some())?;
         plan.refuse_overwriting()?;
         plan.refuse_what_no_scene_can_mend()?;
         Ok(plan)
@@ -152,7 +153,11 @@ impl Plan {
         let images = self.outputs.iter().filter_map(|o| match &o.target {
             Target::File(path) => {
                 let path = self.camera.turntable.map_or_else(|| path.clone(), |_| turntable::frame_path(path, 0));
-                Some(film::files(&path, o.format, &self.aovs))
+                let parts = self.backend.parts().iter().flat_map(move |&part| {
+                    let aovs = if part == both::DIFF { &[] } else { &self.aovs[..] };
+                    film::files(&both::beside(&path, part), o.format, aovs)
+                });
+                Some(parts.collect::<Vec<_>>())
             }
             Target::Stdout => None,
         });
@@ -196,16 +201,6 @@ impl Plan {
             }
         }
         Ok(())
-    }
-}
-
-/// The backend asked for, or the default, if it is in this binary.
-pub fn backend(asked: Option<BackendKind>) -> Result<BackendKind, Failure> {
-    match asked {
-        None => Ok(BackendKind::COMPILED[0]),
-        Some(kind) if BackendKind::COMPILED.contains(&kind) => Ok(kind),
-        Some(kind) => Err(Failure::usage(format!("this tison was built without the backend {}", kind.name()))
-            .help("use --backend native, or install Embree and build with default features")),
     }
 }
 

@@ -1,5 +1,6 @@
 //! The run: read, build, render, write.
 
+use super::both::{self, Comparison};
 use super::camera::{self, Chosen};
 use super::exit::{Exit, Failure};
 use super::frame::Frame;
@@ -16,9 +17,9 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
-use tison::backend::{self, AnyBackend, BuildOptions};
-use tison::film::{self, Display, Film, Notes, Tonemap};
-use tison::render::{self, Control, Job, RenderStats};
+use tison::backend::{self, AnyBackend, BackendKind, BuildOptions};
+use tison::film::{self, Difference, Display, Film, Notes, Tonemap};
+use tison::render::{self, Control, Job, Outcome, RenderStats};
 use tison::scene::format::Override;
 use tison::scene::obj::Reader;
 use tison::scene::{self, CameraDesc, Light, LoadOptions, Loaded, Scene};
@@ -86,6 +87,19 @@ pub struct Done {
     /// Files and their sizes in bytes.
     pub written: Vec<(PathBuf, u64)>,
     pub warnings: usize,
+    /// With two backends, what is above is of the first.
+    pub comparison: Option<Comparison>,
+}
+
+/// One film of a frame.
+#[derive(Clone, Copy, Debug)]
+struct Part<'a> {
+    frame: u32,
+    /// What its files have in their names.
+    name: &'static str,
+    film: &'a Film,
+    /// What 8-bit formats show.
+    shown: &'a Film,
 }
 
 /// A scene that has been read, and how it is to be rendered.
@@ -110,11 +124,11 @@ impl Run<'_> {
         done.seconds.read -= done.seconds.textures;
         let first = ready.chosen.camera;
         self.light(&mut ready.loaded.scene, &first);
-        let backend = timed(&mut done.seconds.build, || self.build(&ready.loaded.scene, &ready.settings.job))?;
+        let backends = self.build_all(&ready, &mut done)?;
         for frame in 0..self.plan.camera.turntable.unwrap_or(1) {
             let camera = self.frame_camera(&ready.chosen, frame);
             self.light(&mut ready.loaded.scene, &camera);
-            self.frame(frame, &camera, &ready, &backend, &mut done)?;
+            self.frame(frame, &camera, &ready, &backends, &mut done)?;
             if self.control.is_cancelled() {
                 break;
             }
@@ -123,11 +137,23 @@ impl Run<'_> {
             return Err(Failure::new(Exit::Render, STOPPED));
         }
         done.seconds.total = started.elapsed().as_secs_f64();
-        let report = Report::new(self.plan, &ready, &backend, done);
+        let report = Report::new(self.plan, &ready, &backends, done);
         let messages = self.messages;
         drop(self);
         report.tell(messages)?;
         Ok(Exit::Done)
+    }
+
+    /// The hierarchies of all backends that are asked for.
+    fn build_all(&self, ready: &Ready, done: &mut Done) -> Result<Vec<AnyBackend>, Failure> {
+        let (kinds, mut backends) = (self.plan.backend.kinds(), Vec::new());
+        let mut took = [0.0; 2];
+        for (&kind, took) in kinds.iter().zip(&mut took) {
+            backends.push(timed(took, || self.build(kind, &ready.loaded.scene, &ready.settings.job))?);
+        }
+        done.seconds.build = took[0];
+        done.comparison = (kinds.len() > 1).then(|| Comparison { build: took, ..Comparison::default() });
+        Ok(backends)
     }
 
     /// Renders one frame and saves it, unless it was stopped before its first pixel.
@@ -136,24 +162,75 @@ impl Run<'_> {
         frame: u32,
         camera: &CameraDesc,
         ready: &Ready,
-        backend: &AnyBackend,
+        backends: &[AnyBackend],
         done: &mut Done,
     ) -> Result<(), Failure> {
-        self.progress.stage(Stage::Render);
-        let outcome = render::run(&ready.loaded.scene, camera, backend, &ready.settings.job, self.control)
-            .map_err(|e| Failure::new(Exit::Usage, e))?;
+        let outcome = self.rendered(camera, ready, &backends[0])?;
         done.seconds.render += outcome.stats.seconds;
         merge(&mut done.stats, &outcome.stats, frame);
         done.finished += outcome.film.finished as u64;
         if outcome.film.finished == 0 {
             return Ok(());
         }
-        self.progress.stage(Stage::Write);
         let display = Display { depth_range: camera.clip, ..ready.settings.display };
-        timed(&mut done.seconds.write, || {
-            let notes = notes(self.plan, &ready.settings, backend);
-            self.save(&outcome.film, frame, &display, &notes, &mut done.written)
-        })
+        let part = Part { frame, name: "", film: &outcome.film, shown: &outcome.film };
+        self.write(part, &display, (ready, &backends[0]), done)?;
+        match (backends.get(1), &mut done.comparison) {
+            (Some(second), Some(comparison)) => {
+                comparison.render[0] += outcome.stats.seconds;
+                self.second(&outcome.film, frame, camera, (ready, second), done)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Renders the frame again and saves it, and how it differs from the `first` time if both are finished.
+    fn second(
+        &self,
+        first: &Film,
+        frame: u32,
+        camera: &CameraDesc,
+        (ready, backend): (&Ready, &AnyBackend),
+        done: &mut Done,
+    ) -> Result<(), Failure> {
+        let Outcome { film, stats } = self.rendered(camera, ready, backend)?;
+        if let Some(comparison) = &mut done.comparison {
+            comparison.render[1] += stats.seconds;
+        }
+        if film.finished == 0 {
+            return Ok(());
+        }
+        let display = Display { depth_range: camera.clip, ..ready.settings.display };
+        let part = Part { frame, name: both::NATIVE, film: &film, shown: &film };
+        self.write(part, &display, (ready, backend), done)?;
+        if !(first.is_complete() && film.is_complete()) {
+            return Ok(());
+        }
+        let difference = Difference::of(first, &film);
+        let (shown, scale) = difference.scaled();
+        if let Some(comparison) = &mut done.comparison {
+            comparison.add(&difference, scale);
+        }
+        let part = Part { frame, name: both::DIFF, film: &difference.image, shown: &shown };
+        self.write(part, &Display::default(), (ready, backend), done)
+    }
+
+    fn rendered(&self, camera: &CameraDesc, ready: &Ready, backend: &AnyBackend) -> Result<Outcome, Failure> {
+        self.progress.stage(Stage::Render);
+        render::run(&ready.loaded.scene, camera, backend, &ready.settings.job, self.control)
+            .map_err(|e| Failure::new(Exit::Usage, e))
+    }
+
+    fn write(
+        &self,
+        part: Part<'_>,
+        display: &Display,
+        (ready, backend): (&Ready, &AnyBackend),
+        done: &mut Done,
+    ) -> Result<(), Failure> {
+        self.progress.stage(Stage::Write);
+        let notes = notes(self.plan, &ready.settings, backend);
+        timed(&mut done.seconds.write, || self.save(part, display, &notes, &mut done.written))
     }
 
     fn pixel(self) -> Result<Exit, Failure> {
@@ -162,7 +239,7 @@ impl Run<'_> {
         let camera = ready.chosen.camera;
         self.light(&mut ready.loaded.scene, &camera);
         let job = &ready.settings.job;
-        let backend = self.build(&ready.loaded.scene, job)?;
+        let backend = self.build(self.plan.backend.kinds()[0], &ready.loaded.scene, job)?;
         let tree = render::explain_pixel(&ready.loaded.scene, &camera, &backend, job, x, y)
             .map_err(|e| Failure::new(Exit::Usage, e))?;
         drop(self);
@@ -210,11 +287,11 @@ impl Run<'_> {
         }
     }
 
-    fn build(&self, scene: &Scene, job: &Job) -> Result<AnyBackend, Failure> {
+    fn build(&self, kind: BackendKind, scene: &Scene, job: &Job) -> Result<AnyBackend, Failure> {
         self.progress.stage(Stage::Build);
         let (crop, frames) = (job.crop, self.plan.camera.turntable.unwrap_or(1));
         let pixels = u64::from(crop.x1 - crop.x0) * u64::from(crop.y1 - crop.y0) * u64::from(frames);
-        self.progress.expect_pixels(pixels);
+        self.progress.expect_pixels(pixels * self.plan.backend.kinds().len() as u64);
         let at_light = |l: &Light| if l.radius > 0.0 { u64::from(job.light_samples) } else { 1 };
         let rays_per_sample = 1 + scene.lights.iter().map(at_light).sum::<u64>();
         let options = BuildOptions {
@@ -223,24 +300,25 @@ impl Run<'_> {
             cancel: &self.control.cancel,
             progress: Some(&|share| self.progress.report(share)),
         };
-        AnyBackend::build(self.plan.backend, scene, &options).map_err(|e| build_failure(&e))
+        AnyBackend::build(kind, scene, &options).map_err(|e| build_failure(&e))
     }
 
     fn save(
         &self,
-        film: &Film,
-        frame: u32,
+        part: Part<'_>,
         display: &Display,
         notes: &Notes,
         written: &mut Vec<(PathBuf, u64)>,
     ) -> Result<(), Failure> {
         for Output { target, format } in &self.plan.outputs {
+            let film = if format.is_linear() { part.film } else { part.shown };
             match target {
                 Target::File(path) => {
                     let path = match self.plan.camera.turntable {
-                        Some(_) => turntable::frame_path(path, frame),
+                        Some(_) => turntable::frame_path(path, part.frame),
                         None => path.clone(),
                     };
+                    let path = both::beside(&path, part.name);
                     written.extend(film::save_all(film, &path, *format, display, notes)?);
                 }
                 Target::Stdout => {

@@ -1,5 +1,6 @@
 //! What a run tells when it is over: one screen on stderr, and figures for programs.
 
+use super::both::Comparison;
 use super::exit::Failure;
 use super::message::Messages;
 use super::plan::Plan;
@@ -33,7 +34,7 @@ pub struct Report<'a> {
 
 impl<'a> Report<'a> {
     /// Of a run that is over.
-    pub fn new(plan: &'a Plan, ready: &'a Ready, backend: &AnyBackend, done: Done) -> Self {
+    pub fn new(plan: &'a Plan, ready: &'a Ready, backends: &[AnyBackend], done: Done) -> Self {
         let scene = &ready.loaded.scene;
         Self {
             plan,
@@ -42,8 +43,8 @@ impl<'a> Report<'a> {
             needs: scene.needs().list().to_vec(),
             unused: ready.loaded.unused,
             scene_bytes: scene.bytes() as u64,
-            backend_bytes: backend.bytes(),
-            details: backend.details(),
+            backend_bytes: backends.iter().map(AnyBackend::bytes).sum(),
+            details: backends.iter().map(AnyBackend::details).collect::<Vec<_>>().join(" and "),
             camera: ready.chosen.camera,
             done,
             peak_memory: system::peak_memory(),
@@ -93,6 +94,7 @@ impl<'a> Report<'a> {
     fn lines(&self) -> Vec<String> {
         let mut lines = vec![self.input_line(), self.backend_line(), self.image_line(), self.rays_line()];
         lines.push(self.time_line());
+        lines.extend(self.done.comparison.iter().flat_map(Comparison::lines));
         if self.plan.verbose {
             lines.push(self.camera_line());
             lines.push(format!("memory    scene {}, hierarchy {}", bytes(self.scene_bytes), bytes(self.backend_bytes)));

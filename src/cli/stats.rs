@@ -1,6 +1,7 @@
 //! The figures of a run as JSON. Others read these keys: add, never rename.
 
 use super::EMBREE;
+use super::both::Comparison;
 use super::report::Report;
 use serde_json::{Map, Value, json};
 use tison::scene::SceneCounts;
@@ -127,5 +128,6 @@ pub fn json(report: &Report<'_>) -> Value {
             "non_finite_samples": stats.non_finite_samples,
         },
         "warnings": report.done.warnings,
+        "comparison": report.done.comparison.as_ref().map(Comparison::json),
     })
 }

@@ -1,6 +1,7 @@
 //! Finished pixels and the files they go to. Knows `math` and nothing else.
 
 mod aov;
+mod difference;
 mod format;
 mod save;
 mod tone;
@@ -9,6 +10,7 @@ mod write;
 use rayon::prelude::*;
 
 pub use aov::{Aov, AovImage};
+pub use difference::Difference;
 pub use format::Format;
 pub use save::{SaveError, Sink, abandon, check_target, is_special_file, save};
 pub use tone::{Display, Tonemap};

@@ -88,10 +88,11 @@ impl<A: Backend, B: Backend> Judge<'_, A, B> {
     /// One of them misses what the other reports. What is nearer must be excused: then the next hit of the one
     /// that reported it takes its place.
     fn different(&self, ray: &Ray, a: Option<Hit>, b: Option<Hit>) -> Verdict {
-        let (mut ray, mut a, mut b) = (*ray, a, b);
+        // What is true is asked of the whole ray; `rest` begins behind what was excused.
+        let (mut rest, mut a, mut b) = (*ray, a, b);
         let mut excuse: Option<Verdict> = None;
         for _ in 0..MOST_IN_A_ROW {
-            let of = |hit: Option<Hit>| hit.map(|hit| (hit, self.facts(&ray, &hit)));
+            let of = |hit: Option<Hit>| hit.map(|hit| (hit, self.facts(ray, &hit)));
             let (of_a, of_b) = (of(a), of(b));
             for (hit, facts) in [of_a, of_b].into_iter().flatten() {
                 if let Some(lie) = lie(&hit, &facts) {
@@ -122,11 +123,11 @@ impl<A: Backend, B: Backend> Judge<'_, A, B> {
             };
             let this = Verdict::new(class, facts.margin);
             excuse = Some(excuse.map_or(this, |e| worse(e, this)));
-            ray.t_near = hit.t.next_up();
+            rest.t_near = hit.t.next_up();
             if first_is_nearer {
-                a = self.first.intersect(&ray);
+                a = self.first.intersect(&rest);
             } else {
-                b = self.second.intersect(&ray);
+                b = self.second.intersect(&rest);
             }
         }
         Verdict::real(0.0)
@@ -148,11 +149,11 @@ impl<A: Backend, B: Backend> Judge<'_, A, B> {
 
     /// Whether every hit of the first backend (or the second) is one that may be missed.
     fn excuse_all(&self, ray: &Ray, of_first: bool) -> Verdict {
-        let (mut ray, mut excuse) = (*ray, None::<Verdict>);
+        let (mut rest, mut excuse) = (*ray, None::<Verdict>);
         for _ in 0..MOST_IN_A_ROW {
-            let next = if of_first { self.first.intersect(&ray) } else { self.second.intersect(&ray) };
+            let next = if of_first { self.first.intersect(&rest) } else { self.second.intersect(&rest) };
             let Some(hit) = next else { return excuse.unwrap_or(Verdict::real(0.0)) };
-            let facts = self.facts(&ray, &hit);
+            let facts = self.facts(ray, &hit);
             let class = match facts.side {
                 Side::In | Side::Out => return Verdict::real(facts.margin),
                 Side::Boundary => Class::Edge,
@@ -160,7 +161,7 @@ impl<A: Backend, B: Backend> Judge<'_, A, B> {
             };
             let this = Verdict::new(class, facts.margin);
             excuse = Some(excuse.map_or(this, |e| worse(e, this)));
-            ray.t_near = hit.t.next_up();
+            rest.t_near = hit.t.next_up();
         }
         Verdict::real(0.0)
     }

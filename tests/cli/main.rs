@@ -5,6 +5,7 @@ mod commands;
 mod images;
 mod scenes;
 mod signals;
+mod verify;
 
 use assert_cmd::Command;
 use std::path::{Path, PathBuf};

@@ -11,8 +11,6 @@ use tison::verify::{Class, Group, Report, run};
 /// What a backend gets wrong. All but the first few ulps must be found out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lie {
-    /// Nothing.
-    No,
     /// `t` by so much of itself.
     T(f32),
     /// The normal by so many radians.

@@ -35,7 +35,7 @@ fn defaults_of_a_bare_mesh() {
     assert_eq!((job.min_weight, job.jitter_radius), (1.0 / 1024.0, 0.5));
     assert_eq!(job.lens_sampler, LensSampler::Concentric);
     assert_eq!(plan.kind, Input::Mesh);
-    assert_eq!(plan.backend, BackendKind::COMPILED[0]);
+    assert_eq!(plan.backend, Backends::One(tison::backend::BackendKind::COMPILED[0]));
     assert_eq!(plan.outputs.len(), 1);
     assert_eq!(plan.outputs[0].target, Target::File("a.b.png".into()));
     assert!(plan.picture.pixel.is_none() && plan.camera.turntable.is_none());

@@ -16,7 +16,8 @@ mod npy;
 mod rows;
 mod stream;
 
-use super::args::{ProgressMode, ReadingArgs, backend};
+use super::args::{ProgressMode, ReadingArgs};
+use super::both::Backends;
 use super::exit::{Exit, Failure};
 use super::message::Messages;
 use super::notice::Notice;
@@ -52,7 +53,7 @@ pub struct ProbeArgs {
     /// Scene (.toml, .json, .ray) or mesh (.obj) to cast rays at; without one each line has a shape of its own
     pub scene: Option<PathBuf>,
     /// Who answers the rays
-    #[arg(long, value_name = "NAME", value_parser = backend())]
+    #[arg(long, value_name = "NAME", value_parser = Backends::parser_of_one())]
     pub backend: Option<BackendKind>,
     /// How rays come and answers go
     #[arg(long, value_enum, default_value = "jsonl")]
@@ -78,7 +79,7 @@ pub enum Format {
 
 /// Answers the rays on stdin.
 pub fn probe(args: &ProbeArgs, messages: &Messages) -> Result<Exit, Failure> {
-    let kind = plan::backend(args.backend)?;
+    let kind = Backends::chosen_one(args.backend)?;
     let threads = args.threads.map_or_else(plan::all_threads, usize::from);
     match &args.scene {
         Some(scene) => Input::of(scene).check_reading(&args.reading, scene)?,
