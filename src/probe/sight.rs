@@ -38,7 +38,8 @@ impl Sight {
         }
         // An origin inside stays, so that nothing is rounded.
         let start = if enter <= 0.0 && near >= 0.0 { 0.0 } else { enter.max(near) };
-        let o = if start == 0.0 { o } else { DVec3::from_array([0, 1, 2].map(|k| start.mul_add(d[k], o[k]) + rest[k])) };
+        let o =
+            if start == 0.0 { o } else { DVec3::from_array([0, 1, 2].map(|k| start.mul_add(d[k], o[k]) + rest[k])) };
         // The answer is compared with what was given once more, so that the end may err to the far side.
         let ray = Ray64 { o, d, t_near: (near - start).max(0.0), t_far: (far - start).next_up() };
         o.is_finite().then_some(Self { ray, start, exponent })

@@ -87,7 +87,8 @@ fn shading_normal(
     let data = &mesh.data;
     let numbers = data.normals.as_ref().map(|n| n.of(data.triangles.faces(), prim as usize));
     let Some(normals) = numbers.and_then(|numbers| data.normals_at(numbers)) else { return front };
-    let normals = normals.map(Vec3::as_dvec3).map(|n| placed.map_or(n, |i| (i.normal_to_scene * n).normalize_or_zero()));
+    let normals =
+        normals.map(Vec3::as_dvec3).map(|n| placed.map_or(n, |i| (i.normal_to_scene * n).normalize_or_zero()));
     let side = front.dot(outer).signum();
     let sum = side * (0..3).map(|k| weights[k] * normals[k]).sum::<DVec3>();
     // Normals that cancel say nothing.

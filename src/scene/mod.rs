@@ -22,8 +22,8 @@ mod texture;
 
 pub use camera::{Camera, CameraDesc, CameraRays, Projection};
 pub use error::{Error, Warning};
-pub use freeze::OneShape;
 pub use framing::{CameraOverrides, View};
+pub use freeze::OneShape;
 pub use light::Light;
 pub use load::{LoadOptions, Loaded, Unused, load};
 pub use material::{Material, Reflect, Textured};

@@ -6,9 +6,7 @@ use tison::backend::BackendKind;
 use tison::geom::{Plain, Sphere, TriangleMesh};
 use tison::math::Frame;
 use tison::probe::ProbeRay;
-use tison::scene::{
-    AnyShapes, Instance, Material, Mesh, MeshData, MeshPaint, Object, Scene, Shapes, smooth,
-};
+use tison::scene::{AnyShapes, Instance, Material, Mesh, MeshData, MeshPaint, Object, Scene, Shapes, smooth};
 
 /// A closed bumpy ball of radius about 1 with `4 n (n - 1)` triangles, wound outwards.
 fn blob(n: u32) -> TriangleMesh {

@@ -116,7 +116,8 @@ fn a_capped_cylinder() {
 fn a_cube() {
     each(OneShape::Cube(Cube::new(DVec3::ZERO, at(1.0, 0.7, 0.4)).unwrap()), |probe, prober| {
         for d in [at(0.0, 0.0, -1.0), at(-0.0, 0.0, -1.0), at(-0.0, -0.0, -1.0)] {
-            for o in [at(0.1, 0.2, 5.0), at(1.0, 0.2, 5.0), at(-0.0, 0.7, 5.0), at(1.0, 0.7, 5.0), at(1.0 - 1e-5, 0.0, 5.0)]
+            for o in
+                [at(0.1, 0.2, 5.0), at(1.0, 0.2, 5.0), at(-0.0, 0.7, 5.0), at(1.0, 0.7, 5.0), at(1.0 - 1e-5, 0.0, 5.0)]
             {
                 let hit = probe(o, d).expect("on the face or its edge");
                 assert_eq!((hit.t, hit.entering), (4.6, true), "{o} {d}");

@@ -106,7 +106,7 @@ fn at_a_large_offset() {
 fn tiny_and_huge() {
     let mut random = Random(23);
     let limits = Limits { margin: 1e-6, t: 1e-12, radians: 1e-12 };
-    for k in [-15, -8, 0, 8, 15, 100] {
+    for k in [-15, -8, 0, 8, 15, 60] {
         for _ in 0..5 {
             let corners = random_triangle(&mut random).map(|p| p * 10f64.powi(k));
             check(&format!("of size 1e{k}"), corners, &DAffine3::IDENTITY, 5.0, &mut random, &limits);
@@ -140,7 +140,10 @@ fn one_without_area_is_never_met() {
         let shape = OneShape::Triangle(ExactTriangle::new(corners));
         for (_, prober) in probers(|| Scene::of_one(shape, &DAffine3::IDENTITY).expect("it can be placed")) {
             for target in corners {
-                assert_eq!(prober.probe(&ProbeRay::new(DVec3::new(0.3, -2.0, 5.0), target - DVec3::new(0.3, -2.0, 5.0))), None);
+                assert_eq!(
+                    prober.probe(&ProbeRay::new(DVec3::new(0.3, -2.0, 5.0), target - DVec3::new(0.3, -2.0, 5.0))),
+                    None
+                );
             }
         }
     }

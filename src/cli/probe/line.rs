@@ -224,9 +224,8 @@ impl<'a> Params<'a> {
             }
             b"triangle" => {
                 self.only(&["a", "b", "c"], "a triangle")?;
-                let corner = |k: usize| {
-                    self.corners[k].map(|c| c.value).ok_or_else(|| missing(at, ["a", "b", "c"][k], POINT))
-                };
+                let corner =
+                    |k: usize| self.corners[k].map(|c| c.value).ok_or_else(|| missing(at, ["a", "b", "c"][k], POINT));
                 Ok(OneShape::Triangle(ExactTriangle::new([corner(0)?, corner(1)?, corner(2)?])))
             }
             other => {

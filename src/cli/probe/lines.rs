@@ -103,7 +103,9 @@ impl Items for Lines<'_> {
                 Err(Wrong::Line(fault)) => {
                     let text = String::from_utf8_lossy(line).into_owned();
                     let column = 1 + String::from_utf8_lossy(&line[..fault.at.min(line.len())]).chars().count() as u64;
-                    return Err(Stop::Bad(Box::new(move |before| bad_line(before + number, column, text, &fault.what))));
+                    return Err(Stop::Bad(Box::new(move |before| {
+                        bad_line(before + number, column, text, &fault.what)
+                    })));
                 }
                 Err(Wrong::Backend(Error::Cancelled)) => return Err(Stop::Cancelled),
                 Err(Wrong::Backend(error)) => {
@@ -182,7 +184,13 @@ mod tests {
         assert_eq!(value["t"].as_f64(), Some(answer.t));
         assert_eq!(value["prim"].as_u64(), Some(4_294_967_294));
         let text = String::from_utf8(out).expect("ASCII");
-        assert!(text.starts_with(r#"{"hit":true,"t":0.30000000000000004,"p":[1e+300,-0.0,5e-324],"n":[0.0,0.0,1.0]"#), "{text}");
-        assert!(text.ends_with("\"texcoord\":[0.5,0.125],\"object\":2,\"prim\":4294967294,\"entering\":false}\n"), "{text}");
+        assert!(
+            text.starts_with(r#"{"hit":true,"t":0.30000000000000004,"p":[1e+300,-0.0,5e-324],"n":[0.0,0.0,1.0]"#),
+            "{text}"
+        );
+        assert!(
+            text.ends_with("\"texcoord\":[0.5,0.125],\"object\":2,\"prim\":4294967294,\"entering\":false}\n"),
+            "{text}"
+        );
     }
 }

@@ -93,7 +93,8 @@ fn shape(text: &str) -> Result<(u64, usize), String> {
 /// A header of `rows` records of this kind, a list as NumPy writes it.
 pub fn written(descr: &str, rows: u64) -> Vec<u8> {
     let mut text = String::new();
-    write!(text, "{{'descr': {descr}, 'fortran_order': False, 'shape': ({rows},), }}").expect("a string takes everything");
+    write!(text, "{{'descr': {descr}, 'fortran_order': False, 'shape': ({rows},), }}")
+        .expect("a string takes everything");
     // Magic, version, length and text together fill whole units, the last byte being the end of the line.
     const UNIT: usize = 64;
     let length = (10 + text.len() + 1).next_multiple_of(UNIT) - 10;
