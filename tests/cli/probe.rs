@@ -205,7 +205,7 @@ fn flags_and_scenes_that_are_wrong() {
         ("--format npy", 2, "name a scene"),
         ("--format xml", 2, "jsonl"),
         ("--backend cuda", 2, "native"),
-        ("-j 0", 2, "-j"),
+        ("-j 0", 2, "--threads"),
         ("-D a=1", 2, "scene file"),
         ("a.obj -D a=1", 2, "scene file"),
         ("nowhere.obj", 3, "cannot read nowhere.obj"),
