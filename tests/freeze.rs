@@ -260,6 +260,7 @@ fn shapes_go_to_one_set_a_class_in_the_order_of_first_use() {
                 AnyShapes::PlacedCubes(_) => "placed cubes",
                 AnyShapes::Cylinders(_) => "cylinders",
                 AnyShapes::Quads(_) => "quads",
+                AnyShapes::Triangles(_) => "triangles",
             };
             (name, s.set.len())
         }

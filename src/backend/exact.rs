@@ -101,7 +101,6 @@ impl ExactBackend {
     /// The hits of `ray` one after the other, in about the order of `t`, each found when it is asked for.
     ///
     /// The ray must start inside [`clip`](Self::clip), and the largest component of its direction be in `[1, 2)`.
-    #[must_use]
     pub fn hits_along(&self, ray: &Ray64) -> impl Iterator<Item = Hit64> {
         self.hits(ray, false)
     }

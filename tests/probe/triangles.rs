@@ -48,7 +48,7 @@ fn check(what: &str, corners: [DVec3; 3], to: &DAffine3, distance: f64, random: 
         let d = a + u * (b - a) + v * (c - a) - o;
         let want = truth(exact, o, d);
         let steep = d.normalize().dot(want.n).abs();
-        if want.inside.abs() < limits.margin / steep || want.t < 1e-3 || !(steep > 1e-3) {
+        if want.inside.abs() < limits.margin / steep || want.t < 1e-3 || steep < 1e-3 {
             continue;
         }
         for (kind, prober) in &probers {
