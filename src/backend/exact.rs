@@ -29,6 +29,8 @@ pub struct ExactBackend {
     tracer: Tracer,
     clip: Bounds,
     slack: f64,
+    /// Embree may let a ray through exactly at a vertex.
+    may_leak: bool,
 }
 
 #[derive(Debug)]
@@ -78,7 +80,8 @@ impl ExactMaker {
                 Tracer::Native(native::Native::build(&scene.objects, &options)?)
             }
         };
-        Ok(ExactBackend { tracer, clip, slack })
+        let may_leak = !matches!(self.kind, Kind::Native) && scene.objects.iter().any(|o| o.mesh().is_some());
+        Ok(ExactBackend { tracer, clip, slack, may_leak })
     }
 }
 
@@ -98,12 +101,32 @@ impl ExactBackend {
     /// The hits of `ray` one after the other, in about the order of `t`, each found when it is asked for.
     ///
     /// The ray must start inside [`clip`](Self::clip), and the largest component of its direction be in `[1, 2)`.
-    #[must_use]
     pub fn hits_along(&self, ray: &Ray64) -> impl Iterator<Item = Hit64> {
+        self.hits(ray, false)
+    }
+
+    /// The same when all that may count is what the rounded ray would have met but for gaps: no more than the rounding of
+    /// the ray itself.
+    #[must_use]
+    pub fn slack_beside(&self) -> f64 {
+        self.slack / 512.0
+    }
+
+    /// What a ray meets that passes a little beside `ray`, at up to 4e-7 of the scene's size; only where a ray that meets the
+    /// very vertex of a mesh may slip through it.
+    #[must_use]
+    pub fn hits_beside(&self, ray: &Ray64) -> Option<impl Iterator<Item = Hit64>> {
+        self.may_leak.then(|| self.hits(ray, true))
+    }
+
+    fn hits(&self, ray: &Ray64, aside: bool) -> Hits<'_> {
         match &self.tracer {
             #[cfg(feature = "embree")]
-            Tracer::Embree(scene) => Hits::Embree(scene.hits_along(ray, self.slack)),
-            Tracer::Native(native) => Hits::Native(native, *ray),
+            Tracer::Embree(scene) => Hits::Embree(scene.hits_along(ray, self.slack, aside)),
+            Tracer::Native(native) => {
+                let _ = aside;
+                Hits::Native(native, *ray)
+            }
         }
     }
 }

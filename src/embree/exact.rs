@@ -19,6 +19,7 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub struct ExactBuilder {
     inner: SceneBuilder,
+    reach: f64,
     pad: f64,
 }
 
@@ -26,6 +27,7 @@ pub struct ExactBuilder {
 #[derive(Debug)]
 pub struct ExactScene {
     inner: Scene,
+    reach: f64,
 }
 
 impl ExactBuilder {
@@ -38,7 +40,7 @@ impl ExactBuilder {
         // Half an ulp of the origin and, from one end of the scene to the other, of a direction whose largest
         // component is in [1, 2): 3 * 2^-24 of the reach.
         let pad = reach * f64::from(f32::EPSILON);
-        Ok(Self { inner: SceneBuilder::new(device, options)?, pad: 2.0 * pad })
+        Ok(Self { inner: SceneBuilder::new(device, options)?, reach, pad: 2.0 * pad })
     }
 
     /// As [`SceneBuilder::mesh`].
@@ -87,7 +89,7 @@ impl ExactBuilder {
     /// # Panics
     /// As there.
     pub fn commit(self, progress: Option<&(dyn Fn(f64) -> bool + Sync)>) -> Result<ExactScene, Error> {
-        Ok(ExactScene { inner: self.inner.commit(progress)? })
+        Ok(ExactScene { inner: self.inner.commit(progress)?, reach: self.reach })
     }
 }
 
@@ -95,22 +97,29 @@ impl ExactScene {
     /// The hits of `ray` one after the other, each found when it is asked for. The largest component of its direction
     /// must be in `[1, 2)`, and its start and end within reach, where it has one.
     ///
-    /// Shapes come with their exact `t`, inside the open interval. Triangles are met by the rounded ray, from `back`
-    /// before the interval on, so that none in it is left out for its rounding; who asks computes their `t` anew.
+    /// Shapes come with their exact `t`, inside the open interval. Triangles are met by the rounded ray, from `slack`
+    /// before the interval to as much behind it, so that none is left out for its rounding; who asks computes their `t`
+    /// anew. With `aside` that ray is off by two ulps more, across its main axis: exactly at a vertex, where the
+    /// triangles around it can leave a gap, it then meets one of them.
     #[must_use]
-    pub fn hits_along(&self, ray: &Ray64, back: f64) -> HitsAlong<'_> {
-        let base = ray.t_near - back;
-        let o = DVec3::from_array([0, 1, 2].map(|k| base.mul_add(ray.d[k], ray.o[k]))).as_vec3();
+    pub fn hits_along(&self, ray: &Ray64, slack: f64, aside: bool) -> HitsAlong<'_> {
+        let base = ray.t_near - slack;
+        let mut o = DVec3::from_array([0, 1, 2].map(|k| base.mul_add(ray.d[k], ray.o[k])));
         let small = ray.d.abs().cmplt(DVec3::splat(f32::MIN_POSITIVE.into()));
         // -0.0 becomes +0.0 as well.
-        let d = DVec3::select(small, DVec3::ZERO, ray.d).as_vec3();
+        let mut d = DVec3::select(small, DVec3::ZERO, ray.d);
+        if aside {
+            let across = DVec3::select(ray.d.abs().cmpge(DVec3::ONE), DVec3::ZERO, DVec3::splat(f32::EPSILON.into()));
+            (o, d) = (o + self.reach * across, d + across);
+        }
+        let (o, d) = (o.as_vec3(), d.as_vec3());
         let mut query = MaybeUninit::uninit();
         // SAFETY: fills the context that it is given.
         unsafe { sys::rtcInitRayQueryContext(query.as_mut_ptr()) };
         // SAFETY: filled by the call above.
         let query = unsafe { query.assume_init() };
         let context = Context { query, ray: *ray, base, nearest: Cell::new(None) };
-        let t_far = ((ray.t_far - base) as f32).next_up();
+        let t_far = ((ray.t_far - base + slack) as f32).next_up();
         HitsAlong { scene: &self.inner, context, ray: Ray { o, d, t_near: 0.0, t_far } }
     }
 

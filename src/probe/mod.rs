@@ -31,6 +31,7 @@ mod sight;
 mod surface;
 
 use crate::backend::{BackendKind, BuildOptions, Error, ExactBackend, ExactMaker};
+use crate::geom::{Hit64, Ray64};
 use crate::scene::Scene;
 use glam::{DVec2, DVec3};
 use sight::Sight;
@@ -125,12 +126,31 @@ impl Prober {
     #[must_use]
     pub fn probe(&self, ray: &ProbeRay) -> Option<Answer> {
         let sight = Sight::new(ray, &self.scene.frame, &self.backend.clip())?;
-        let answers = self.backend.hits_along(&sight.ray).take(MOST_HITS).map(|hit| {
+        let hits = self.backend.hits_along(&sight.ray);
+        let nearest = self.first(ray, &sight, f64::INFINITY, self.backend.slack(), hits);
+        // Nearer than that by more than rounding, in case the ray slipped through between triangles.
+        let t_far = nearest.as_ref().map_or(sight.ray.t_far, |(s, _)| s - 2.0 * self.backend.slack());
+        let nearer = Ray64 { t_far, ..sight.ray };
+        let beside = if t_far > nearer.t_near { self.backend.hits_beside(&nearer) } else { None };
+        let missed = beside.and_then(|hits| self.first(ray, &sight, t_far, self.backend.slack_beside(), hits));
+        missed.or(nearest).map(|(_, answer)| answer)
+    }
+
+    /// The first of `hits` that counts, and its parameter along `sight`: inside the ray's interval, before `t_far`, and no
+    /// further from the exact ray than `slack`, or it was never met.
+    fn first(
+        &self,
+        ray: &ProbeRay,
+        sight: &Sight,
+        t_far: f64,
+        slack: f64,
+        hits: impl Iterator<Item = Hit64>,
+    ) -> Option<(f64, Answer)> {
+        let answers = hits.take(MOST_HITS).map(|hit| {
             let surface = Surface::of(&self.scene, &sight.ray, &hit);
             let t = sight.t(surface.t);
-            // What is further away than rounding explains was never met.
-            let met = surface.off <= self.backend.slack();
-            (met && t > ray.t_min && t < ray.t_max).then(|| surface.answer(&self.scene, &hit, t))
+            let counts = surface.off <= slack && surface.t < t_far && t > ray.t_min && t < ray.t_max;
+            counts.then(|| (surface.t, surface.answer(&self.scene, &hit, t)))
         });
         answers.flatten().next()
     }

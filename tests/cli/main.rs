@@ -3,6 +3,7 @@
 mod bad_input;
 mod commands;
 mod images;
+mod probe;
 mod scenes;
 mod signals;
 mod verify;

@@ -2,7 +2,7 @@
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use tison::backend::BackendKind;
 use tison::bench::truth::{Solid, truth};
-use tison::geom::{Cube, Cylinder, Quad, Sphere};
+use tison::geom::{Cube, Cylinder, ExactTriangle, Quad, Sphere};
 use tison::probe::{Answer, ProbeRay, Prober};
 use tison::scene::{OneShape, Scene};
 
@@ -30,6 +30,7 @@ fn shape(solid: Solid) -> OneShape {
             OneShape::Cylinder(Cylinder::new(1.0, 2.0 * half, capped).expect("a cylinder"))
         }
         Solid::Quad(half) => OneShape::Quad(Quad::new(DVec2::from(half)).expect("a quad")),
+        Solid::Triangle(corners) => OneShape::Triangle(ExactTriangle::new(corners)),
     }
 }
 

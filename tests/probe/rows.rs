@@ -42,7 +42,7 @@ fn a_planet_underfoot() {
             if -d.dot(up) < 0.05 {
                 continue;
             }
-            let want = super::truth::truth(s.solid, &s.to_world, o, d, 0.0).hit.expect("downwards").0;
+            let want = tison::bench::truth::truth(s.solid, &s.to_world, o, d, 0.0).hit.expect("downwards").0;
             for (kind, prober) in &s.probers {
                 let got = prober.probe(&ProbeRay::new(o, d)).expect("downwards");
                 let off = (got.t - want).abs() / want;

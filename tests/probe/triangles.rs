@@ -2,7 +2,7 @@
 use super::kit::*;
 use glam::{DAffine3, DMat3, DVec3};
 use tison::geom::ExactTriangle;
-use tison::math::dd::{Dd, V, dd};
+use tison::math::dd::{Dd, Dd3, dd};
 use tison::probe::ProbeRay;
 use tison::scene::{OneShape, Scene};
 
@@ -15,22 +15,22 @@ struct Truth {
 }
 
 /// Cramer's rule in long numbers (Möller & Trumbore 1997).
-fn truth([a, b, c]: [V; 3], o: DVec3, d: DVec3) -> Truth {
-    let (o, d) = (V::of(o), V::of(d));
-    let (e1, e2) = (b.sub(a), c.sub(a));
+fn truth([a, b, c]: [Dd3; 3], o: DVec3, d: DVec3) -> Truth {
+    let (o, d) = (Dd3::of(o), Dd3::of(d));
+    let (e1, e2) = (b - a, c - a);
     let n = e1.cross(e2);
-    let (s, det) = (o.sub(a), dd(0.0) - d.dot(n));
+    let (s, det) = (o - a, dd(0.0) - d.dot(n));
     let q = s.cross(d);
     let (u, v, t): (Dd, Dd, Dd) = (e2.dot(q) / det, dd(0.0) - e1.dot(q) / det, s.dot(n) / det);
     let inside = u.to_f64().min(v.to_f64()).min((dd(1.0) - u - v).to_f64());
     Truth { t: t.to_f64(), n: n.scale(dd(1.0) / n.length()).to_f64(), uv: [u.to_f64(), v.to_f64()], inside }
 }
 
-fn moved(corners: [DVec3; 3], to: &DAffine3) -> [V; 3] {
-    let columns = [to.matrix3.x_axis, to.matrix3.y_axis, to.matrix3.z_axis].map(V::of);
+fn moved(corners: [DVec3; 3], to: &DAffine3) -> [Dd3; 3] {
+    let columns = [to.matrix3.x_axis, to.matrix3.y_axis, to.matrix3.z_axis].map(Dd3::of);
     corners.map(|p| {
         let terms = [0, 1, 2].map(|k| columns[k].scale(dd(p[k])));
-        terms[0].add(terms[1]).add(terms[2]).add(V::of(to.translation))
+        terms[0] + terms[1] + terms[2] + Dd3::of(to.translation)
     })
 }
 
@@ -39,7 +39,7 @@ fn check(what: &str, corners: [DVec3; 3], to: &DAffine3, distance: f64, random: 
     let shape = OneShape::Triangle(ExactTriangle::new(corners));
     let probers = probers(|| Scene::of_one(shape, to).expect("it can be placed"));
     let exact = moved(corners, to);
-    let [a, b, c] = exact.map(V::to_f64);
+    let [a, b, c] = exact.map(Dd3::to_f64);
     let size = (b - a).length().max((c - a).length());
     let (mut hits, mut misses) = (0, 0);
     for _ in 0..100 {
@@ -48,7 +48,7 @@ fn check(what: &str, corners: [DVec3; 3], to: &DAffine3, distance: f64, random: 
         let d = a + u * (b - a) + v * (c - a) - o;
         let want = truth(exact, o, d);
         let steep = d.normalize().dot(want.n).abs();
-        if want.inside.abs() < limits.margin / steep || want.t < 1e-3 || !(steep > 1e-3) {
+        if want.inside.abs() < limits.margin / steep || want.t < 1e-3 || steep < 1e-3 {
             continue;
         }
         for (kind, prober) in &probers {
@@ -106,7 +106,7 @@ fn at_a_large_offset() {
 fn tiny_and_huge() {
     let mut random = Random(23);
     let limits = Limits { margin: 1e-6, t: 1e-12, radians: 1e-12 };
-    for k in [-15, -8, 0, 8, 15, 100] {
+    for k in [-15, -8, 0, 8, 15, 60] {
         for _ in 0..5 {
             let corners = random_triangle(&mut random).map(|p| p * 10f64.powi(k));
             check(&format!("of size 1e{k}"), corners, &DAffine3::IDENTITY, 5.0, &mut random, &limits);
