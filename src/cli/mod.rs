@@ -4,6 +4,7 @@
 //! stdout carries only what was asked for; everything else is on stderr.
 
 mod args;
+mod bench;
 mod camera;
 mod config;
 mod example;
@@ -74,6 +75,7 @@ fn run(cli: Cli) -> Exit {
         Some(Command::Info(args)) => info::info(&args, &messages),
         Some(Command::Check(args)) => info::check(&args, &messages),
         Some(Command::Example { name }) => example::example(name.as_ref(), &messages),
+        Some(Command::Bench { what }) => bench::bench(&what, &messages),
         Some(Command::Completions { shell }) => output::print_with(|out| {
             clap_complete::generate(shell, &mut Cli::command(), "tison", out);
             Ok(())

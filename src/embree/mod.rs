@@ -9,6 +9,7 @@
 //! | `rescale` | directions of a length at which Embree would lose hits |
 //! | `user` | [`PrimSet`]: shapes that Embree calls back for |
 //! | `instance` | scenes placed in others |
+//! | `raw` | what Embree answers by itself, to compare with |
 //! | `fault` | panics in those callbacks, kept until Rust code can raise them again |
 //!
 //! It knows `geom` and the crate `embree4-sys`; nothing of the latter leaves this room. What must not happen at the
@@ -37,6 +38,7 @@ mod fault;
 mod instance;
 mod packet;
 mod query;
+mod raw;
 mod rescale;
 mod scene;
 mod user;
