@@ -5,13 +5,24 @@
 //! |---|---|
 //! | `truth` | where a ray meets a shape, exactly |
 //! | `random`, `setup` | numbers, rays and scenes to measure with |
+//! | `textbook` | the shapes as books test them, in f32 |
+//! | `wrong` | wrong answers about single shapes |
 //! | `closed` | rays in closed meshes: how many leak |
 //! | `leaving` | rays that leave surfaces: how many meet them again |
+//! | `cost` | the time of a test and of a refinement |
+//! | `stability` | all of that in one report |
+//! | `report`, `plot` | tables, pages, SVG |
 //!
 //! The tests ask the same questions with fewer rays.
 
 pub mod closed;
+pub mod cost;
 pub mod leaving;
+pub mod plot;
 pub mod random;
+pub mod report;
 pub mod setup;
+pub mod stability;
+pub mod textbook;
 pub mod truth;
+pub mod wrong;

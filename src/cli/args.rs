@@ -82,6 +82,11 @@ pub enum Command {
         #[command(subcommand)]
         name: Option<Example>,
     },
+    /// Measure how right and how fast the tracer is
+    Bench {
+        #[command(subcommand)]
+        what: super::bench::Bench,
+    },
     /// Write completions for a shell to stdout
     Completions {
         /// Shell to write for

@@ -4,6 +4,7 @@
 //! stdout carries only what was asked for; everything else is on stderr.
 
 mod args;
+mod bench;
 mod both;
 mod camera;
 mod config;
@@ -79,6 +80,7 @@ fn run(cli: Cli) -> Exit {
         Some(Command::Verify(args)) => verify::verify(&args, &messages),
         Some(Command::Probe(args)) => probe::probe(&args, &messages),
         Some(Command::Example { name }) => example::example(name.as_ref(), &messages),
+        Some(Command::Bench { what }) => bench::bench(&what, &messages),
         Some(Command::Completions { shell }) => output::print_with(|out| {
             clap_complete::generate(shell, &mut Cli::command(), "tison", out);
             Ok(())

@@ -10,6 +10,7 @@
 //! | `user` | [`PrimSet`]: shapes that Embree calls back for |
 //! | `instance` | scenes placed in others |
 //! | `exact` | scenes for rays in f64: shapes see those, triangles the rounded ones |
+//! | `raw` | what Embree answers by itself, to compare with |
 //! | `fault` | panics in those callbacks, kept until Rust code can raise them again |
 //!
 //! It knows `geom` and the crate `embree4-sys`; nothing of the latter leaves this room. What must not happen at the
@@ -39,6 +40,7 @@ mod fault;
 mod instance;
 mod packet;
 mod query;
+mod raw;
 mod rescale;
 mod scene;
 mod user;

@@ -108,7 +108,7 @@ impl Scene {
     }
 
     #[inline]
-    fn intersect_plain(&self, ray: &Ray) -> Option<Hit> {
+    pub(super) fn intersect_plain(&self, ray: &Ray) -> Option<Hit> {
         let mut query = sys::RTCRayHit {
             ray: c_ray(ray),
             hit: sys::RTCHit {

@@ -1,15 +1,15 @@
 //! From a frozen scene and a backend to a film: tiles, waves of rays, shading.
 
-mod block;
+pub(crate) mod block;
 mod certificate;
 mod contacts;
 mod explain;
-mod facets;
+pub(crate) mod facets;
 mod job;
 mod lights;
 mod media;
 pub mod optics;
-mod paint;
+pub(crate) mod paint;
 mod shade;
 mod shapes;
 mod surface;

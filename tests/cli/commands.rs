@@ -268,3 +268,25 @@ fn progress_as_json_lines() {
     let out = bench.expect("a.obj --size 40x30 --progress json", 0);
     assert!(!text(&out.stderr).contains('{'), "silent below half a second");
 }
+
+#[test]
+fn bench_stability_reports_as_text_json_and_page() {
+    let bench = Bench::new();
+    let out = bench.expect("bench stability --only leaks --rays 1000 -o page.html --json all.json", 0);
+    let table = text(&out.stdout);
+    assert!(table.contains("Leaks of closed meshes") && table.contains("at vertices"), "{table}");
+    assert_eq!(bench.names(), ["a.obj", "all.json", "page.html"]);
+    let json: Value = serde_json::from_slice(&bench.read("all.json")).unwrap();
+    let cases = json["sections"]["leaks"]["data"].as_array().unwrap();
+    assert!(cases.len() >= 20);
+    for case in cases.iter().filter(|c| c["who"] == "native") {
+        assert_eq!((&case["leaks"], &case["rays"]), (&0.into(), &1000.into()), "{case}");
+    }
+    let page = bench.read("page.html");
+    assert!(text(&page).starts_with("<!DOCTYPE html>") && text(&page).contains("--only leaks --rays 1000"));
+    let out = bench.expect("bench stability --only leaks --rays 10 --json -", 0);
+    assert!(serde_json::from_slice::<Value>(&out.stdout).is_ok());
+    bench.expect("bench stability --only leaks -o none/page.html", 4);
+    bench.expect("bench stability --only leak", 2);
+    bench.expect("bench stability --rays 0", 2);
+}

@@ -1,0 +1,90 @@
+//! `bench`: how right and how fast the tracer is.
+
+use super::exit::{Exit, Failure};
+use super::message::Messages;
+use super::{output, style};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, Subcommand};
+use std::path::{Path, PathBuf};
+use tison::bench::report::Report;
+use tison::bench::stability::{self, Part};
+use tison::film;
+
+/// What can be measured.
+#[derive(Debug, Subcommand)]
+pub enum Bench {
+    /// Wrong answers, leaks and false shadows over distance, scale and place, and what accuracy costs
+    Stability(StabilityArgs),
+}
+
+/// Where what was measured goes.
+#[derive(Args, Debug)]
+pub struct ReportArgs {
+    /// Write a page with the tables and plots
+    #[arg(short, long, value_name = "FILE.html")]
+    output: Option<PathBuf>,
+    /// Write what was measured for programs; `-` is stdout, instead of the tables
+    #[arg(long, value_name = "FILE.json")]
+    json: Option<PathBuf>,
+}
+
+/// `bench stability`.
+#[derive(Args, Debug)]
+pub struct StabilityArgs {
+    /// Rays for each case of leaks and of false shadows [default: so many that all takes about a minute]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
+    rays: Option<u64>,
+    /// Parts to measure [default: all]
+    #[arg(long, value_name = "PART,…", value_delimiter = ',', value_parser = part())]
+    only: Vec<Part>,
+    #[command(flatten)]
+    report: ReportArgs,
+}
+
+fn part() -> impl TypedValueParser<Value = Part> {
+    PossibleValuesParser::new(Part::ALL.map(Part::name))
+        .map(|name| Part::ALL.into_iter().find(|p| p.name() == name).expect("only their names are possible"))
+}
+
+/// Measures what was asked for.
+pub fn bench(what: &Bench, messages: &Messages) -> Result<Exit, Failure> {
+    match what {
+        Bench::Stability(args) => stability(args, messages),
+    }
+}
+
+fn stability(args: &StabilityArgs, messages: &Messages) -> Result<Exit, Failure> {
+    args.report.check()?;
+    let parts = if args.only.is_empty() { Part::ALL.to_vec() } else { args.only.clone() };
+    let options = stability::Options { rays: args.rays, parts };
+    let report = stability::run(&options, &|part| messages.line(&format!("measuring {part}")));
+    let report = report.map_err(|e| Failure::new(Exit::Render, "cannot measure").because(e))?;
+    args.report.tell(&report, messages)
+}
+
+impl ReportArgs {
+    /// Before the work is done: whether what comes of it can be written.
+    fn check(&self) -> Result<(), Failure> {
+        let mut files = [&self.output, &self.json].into_iter().flatten().filter(|path| path.as_os_str() != "-");
+        files.try_for_each(|path| Ok(film::check_target(path)?))
+    }
+
+    fn tell(&self, report: &Report, messages: &Messages) -> Result<Exit, Failure> {
+        let json = format!("{:#}\n", report.json());
+        if let Some(path) = &self.output {
+            write(path, &report.html(), messages)?;
+        }
+        match &self.json {
+            Some(path) if path.as_os_str() == "-" => return output::print(json.as_bytes()),
+            Some(path) => write(path, &json, messages)?,
+            None => {}
+        }
+        output::print(report.text().as_bytes())
+    }
+}
+
+fn write(path: &Path, text: &str, messages: &Messages) -> Result<(), Failure> {
+    let size = film::save(path, |out| out.write_all(text.as_bytes()))?;
+    messages.line(&format!("wrote     {} ({})", path.display(), style::bytes(size)));
+    Ok(())
+}
