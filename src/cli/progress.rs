@@ -24,6 +24,7 @@ pub enum Stage {
     Read,
     Build,
     Render,
+    #[cfg(feature = "embree")]
     Compare,
     Write,
 }
@@ -34,6 +35,7 @@ impl Stage {
             Self::Read => "read",
             Self::Build => "build",
             Self::Render => "render",
+            #[cfg(feature = "embree")]
             Self::Compare => "compare",
             Self::Write => "write",
         }

@@ -123,7 +123,7 @@ impl<A: Backend, B: Backend> Judge<'_, A, B> {
             };
             let this = Verdict::new(class, facts.margin);
             excuse = Some(excuse.map_or(this, |e| worse(e, this)));
-            rest.t_near = hit.t.next_up();
+            rest.t_near = behind(&rest, &hit);
             if first_is_nearer {
                 a = self.first.intersect(&rest);
             } else {
@@ -161,7 +161,7 @@ impl<A: Backend, B: Backend> Judge<'_, A, B> {
             };
             let this = Verdict::new(class, facts.margin);
             excuse = Some(excuse.map_or(this, |e| worse(e, this)));
-            rest.t_near = hit.t.next_up();
+            rest.t_near = behind(&rest, &hit);
         }
         Verdict::real(0.0)
     }
@@ -222,6 +222,11 @@ fn beyond(facts: &Facts, t: f32) -> f64 {
 /// The same primitive, reported by both; nothing if each `t` may be.
 fn t_of_same(facts: &Facts, a: &Hit, b: &Hit) -> Option<Verdict> {
     [a, b].into_iter().find_map(|hit| lie(hit, facts))
+}
+
+/// Where to go on behind a hit. A backend that rounds may report it before the start of the ray, and once more.
+fn behind(ray: &Ray, hit: &Hit) -> f32 {
+    hit.t.max(ray.t_near).next_up()
 }
 
 /// The one that says more.

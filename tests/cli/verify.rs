@@ -29,7 +29,7 @@ fn a_difference_of_the_readers_has_an_exit_code_and_a_line() {
     bench.write("c.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl blue\nf 1 2 3\n usemtl red\nf 3 2 1\n");
     let out = bench.expect("verify --readers c.obj", 5);
     let told = text(&out.stdout);
-    assert!(told.contains("materials differ once, first in line 7: own 'red', tobj ''"), "{told}");
+    assert!(told.contains("materials differ once, first in line 7: own 'red', tobj 'default'"), "{told}");
     assert!(told.contains("DISAGREE"), "{told}");
     let told = json(&bench.expect("verify --readers --json c.obj", 5).stdout);
     assert_eq!(told["agree"], false);

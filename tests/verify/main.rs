@@ -1,5 +1,7 @@
 //! The comparison of backends: what it finds in backends that lie, and that it finds nothing where there is nothing.
 
+#[cfg(feature = "embree")]
+mod isa;
 mod lies;
 mod readers;
 #[cfg(feature = "embree")]

@@ -1,5 +1,7 @@
 //! `verify`: both backends and both readers, compared.
 
+#[cfg(feature = "embree")]
+mod backends;
 mod json;
 mod text;
 
@@ -8,7 +10,7 @@ use super::exit::{Exit, Failure};
 use super::message::Messages;
 use super::notice::Notice;
 use super::plan::Input;
-use super::progress::{Progress, Stage};
+use super::progress::Progress;
 use super::render::Reading;
 use super::settings::SIZE;
 use super::signals::Signals;
@@ -22,8 +24,8 @@ use tison::film;
 use tison::math::Frame;
 use tison::render::Control;
 use tison::scene::Loaded;
+use tison::verify::Report;
 use tison::verify::readers::{self, Compared};
-use tison::verify::{Options, Report};
 
 /// What the help ends with.
 pub const AFTER_HELP: &str = "\
@@ -148,7 +150,10 @@ impl<'a> Run<'a, '_> {
         let readers = self.compare_readers(&loaded)?;
         let frame = loaded.scene.frame;
         let (size, aimed) = (self.size(&loaded)?, self.aimed(&loaded));
+        #[cfg(feature = "embree")]
         let backends = if args.readers { None } else { Some(self.compare_backends(loaded, size, aimed)?) };
+        #[cfg(not(feature = "embree"))]
+        let backends = None;
         let seconds = started.elapsed().as_secs_f64();
         Ok(Story { file: &args.input, seed: args.seed, size, aimed, backends, frame, readers, seconds })
     }
@@ -190,47 +195,5 @@ impl<'a> Run<'a, '_> {
         const EACH: u64 = 200;
         let primitives = (loaded.scene.stored_triangles() + loaded.scene.shapes()) as u64;
         self.args.rays.unwrap_or_else(|| (EACH * primitives).clamp(LEAST, MOST))
-    }
-
-    #[cfg(feature = "embree")]
-    fn compare_backends(&self, mut loaded: Loaded, size: (u32, u32), aimed: u64) -> Result<Report, Failure> {
-        use tison::backend::{AnyBackend, BackendKind, BuildOptions};
-        use tison::scene::{CameraOverrides, View};
-
-        let scene = &mut loaded.scene;
-        let aspect = f64::from(size.0) / f64::from(size.1);
-        let camera = match loaded.cameras.first() {
-            Some(named) => named.camera,
-            None => scene
-                .auto_camera(View::default(), &CameraOverrides::default(), aspect)
-                .map_err(|e| Failure::new(Exit::Input, e))?,
-        };
-        if Input::of(&self.args.input) == Input::Mesh {
-            scene.light_from(&camera);
-        }
-        self.progress.stage(Stage::Build);
-        let build = |kind| {
-            let options = BuildOptions {
-                threads: self.args.threads.map_or(0, usize::from),
-                rays_expected: u64::MAX,
-                cancel: &self.control.cancel,
-                progress: None,
-            };
-            AnyBackend::build(kind, &loaded.scene, &options).map_err(|e| render::build_failure(&e))
-        };
-        let (first, second) = (build(BackendKind::Embree)?, build(BackendKind::Native)?);
-        let (AnyBackend::Embree(first), AnyBackend::Native(second)) = (&first, &second) else {
-            unreachable!("they are of the kinds that were asked for")
-        };
-        self.progress.stage(Stage::Compare);
-        let tell = |share: f64| self.progress.report(share);
-        let options =
-            Options { size, aimed, seed: self.args.seed, cancel: &self.control.cancel, progress: Some(&tell) };
-        tison::verify::run(&loaded.scene, &camera, (first, second), &options).map_err(|e| Failure::new(Exit::Input, e))
-    }
-
-    #[cfg(not(feature = "embree"))]
-    fn compare_backends(&self, _: Loaded, _: (u32, u32), _: u64) -> Result<Report, Failure> {
-        unreachable!("refused before: there is one backend")
     }
 }

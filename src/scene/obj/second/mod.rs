@@ -136,8 +136,8 @@ impl Values {
 
 impl Joined {
     fn add(&mut self, mesh: &tobj::Mesh, source: &Source) -> Result<(), Error> {
-        let odd = |x: &f64| !(x.abs() <= LARGEST);
-        if [&mesh.positions, &mesh.normals, &mesh.texcoords].into_iter().flatten().any(odd) {
+        let good = |x: &f64| x.abs() <= LARGEST;
+        if ![&mesh.positions, &mesh.normals, &mesh.texcoords].into_iter().flatten().all(good) {
             let what = "it reads a number that is not finite or beyond 1e300; our own reader tells where".into();
             return Err(Error::SecondReader { path: source.path.clone(), line: None, what });
         }
