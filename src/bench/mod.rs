@@ -11,6 +11,7 @@
 //! | `leaving` | rays that leave surfaces: how many meet them again |
 //! | `cost` | the time of a test and of a refinement |
 //! | `stability` | all of that in one report |
+//! | `speed` | the native tracer against Embree |
 //! | `report`, `plot` | tables, pages, SVG |
 //!
 //! The tests ask the same questions with fewer rays.
@@ -22,6 +23,7 @@ pub mod plot;
 pub mod random;
 pub mod report;
 pub mod setup;
+pub mod speed;
 pub mod stability;
 pub mod textbook;
 pub mod truth;

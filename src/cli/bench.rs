@@ -7,6 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 use tison::bench::report::Report;
+use tison::bench::speed;
 use tison::bench::stability::{self, Part};
 use tison::film;
 
@@ -15,6 +16,8 @@ use tison::film;
 pub enum Bench {
     /// Wrong answers, leaks and false shadows over distance, scale and place, and what accuracy costs
     Stability(StabilityArgs),
+    /// The native tracer against Embree: seconds to build and rays per second, by one thread and by all
+    Speed(SpeedArgs),
 }
 
 /// Where what was measured goes.
@@ -41,6 +44,34 @@ pub struct StabilityArgs {
     report: ReportArgs,
 }
 
+/// `bench speed`.
+#[derive(Args, Debug)]
+pub struct SpeedArgs {
+    /// Scenes or meshes to trace, instead of generated ones unless those are asked for too
+    #[arg(value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Triangles of generated meshes; 0 is none [default: 10000,100000,1000000,5000000]
+    #[arg(
+        long, value_name = "N,…", value_delimiter = ',', allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u64).range(..=100_000_000)
+    )]
+    triangles: Vec<u64>,
+    /// Spheres at random places; 0 is none [default: 10000,100000]
+    #[arg(
+        long, value_name = "N,…", value_delimiter = ',', allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u32).range(..=10_000_000)
+    )]
+    spheres: Vec<u32>,
+    /// Rounds, of which the medians count
+    #[arg(
+        long, value_name = "N", default_value = "5", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u16).range(1..)
+    )]
+    rounds: u16,
+    #[command(flatten)]
+    report: ReportArgs,
+}
+
 fn part() -> impl TypedValueParser<Value = Part> {
     PossibleValuesParser::new(Part::ALL.map(Part::name))
         .map(|name| Part::ALL.into_iter().find(|p| p.name() == name).expect("only their names are possible"))
@@ -50,6 +81,7 @@ fn part() -> impl TypedValueParser<Value = Part> {
 pub fn bench(what: &Bench, messages: &Messages) -> Result<Exit, Failure> {
     match what {
         Bench::Stability(args) => stability(args, messages),
+        Bench::Speed(args) => speed(args, messages),
     }
 }
 
@@ -59,6 +91,28 @@ fn stability(args: &StabilityArgs, messages: &Messages) -> Result<Exit, Failure>
     let options = stability::Options { rays: args.rays, parts };
     let report = stability::run(&options, &|part| messages.line(&format!("measuring {part}")));
     let report = report.map_err(|e| Failure::new(Exit::Render, "cannot measure").because(e))?;
+    args.report.tell(&report, messages)
+}
+
+fn speed(args: &SpeedArgs, messages: &Messages) -> Result<Exit, Failure> {
+    args.report.check()?;
+    let mut options = speed::Options {
+        triangles: args.triangles.clone(),
+        spheres: args.spheres.clone(),
+        files: args.files.clone(),
+        rounds: usize::from(args.rounds),
+    };
+    if options.files.is_empty() && options.triangles.is_empty() && options.spheres.is_empty() {
+        options.triangles = vec![10_000, 100_000, 1_000_000, 5_000_000];
+        options.spheres = vec![10_000, 100_000];
+    }
+    options.triangles.retain(|&n| n > 0);
+    options.spheres.retain(|&n| n > 0);
+    let report = speed::run(&options, &|scene| messages.line(&format!("measuring {scene}")));
+    let report = report.map_err(|e| match e {
+        speed::Error::Load(e) => e.into(),
+        e => Failure::new(Exit::Render, "cannot measure").because(e),
+    })?;
     args.report.tell(&report, messages)
 }
 

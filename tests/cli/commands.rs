@@ -290,3 +290,18 @@ fn bench_stability_reports_as_text_json_and_page() {
     bench.expect("bench stability --only leak", 2);
     bench.expect("bench stability --rays 0", 2);
 }
+
+#[test]
+fn bench_speed_compares_the_backends() {
+    let bench = Bench::new();
+    let out = bench.expect("bench speed a.obj --rounds 1 --json -", 0);
+    let json: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let rows = json["sections"]["one_thread"]["data"].as_array().unwrap();
+    assert_eq!(rows.len(), 6, "building, and five kinds of rays");
+    for row in rows {
+        assert!(row["scene"] == "a.obj" && row["native"].as_f64().unwrap() > 0.0, "{row}");
+        assert_eq!(row["embree"].is_null(), cfg!(not(feature = "embree")), "{row}");
+    }
+    bench.expect("bench speed none.obj", 3);
+    bench.expect("bench speed --rounds 0", 2);
+}
