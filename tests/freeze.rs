@@ -44,6 +44,7 @@ impl Folder {
         static GO_ON: AtomicBool = AtomicBool::new(false);
         let mut options = LoadOptions {
             reader: Reader::Own,
+            exact: false,
             smooth: None,
             allow: vec![],
             overrides: vec![],
@@ -654,6 +655,7 @@ fn options_reach_the_reader() {
     let stop = AtomicBool::new(false);
     let options = LoadOptions {
         reader: Reader::Own,
+        exact: false,
         smooth: None,
         allow: vec![],
         overrides: vec![],

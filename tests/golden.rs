@@ -86,6 +86,7 @@ fn load(file: &str) -> Loaded {
     let cancel = AtomicBool::new(false);
     let options = LoadOptions {
         reader: Reader::Own,
+        exact: false,
         smooth: None,
         allow: vec![],
         overrides: vec![],

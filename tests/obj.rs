@@ -14,6 +14,7 @@ static GO_ON: AtomicBool = AtomicBool::new(false);
 fn options(allow: &[PathBuf]) -> ReadOptions<'_> {
     ReadOptions {
         reader: Reader::Own,
+        rests: false,
         normals: true,
         uv: Uv::Always,
         materials: true,

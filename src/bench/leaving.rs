@@ -234,6 +234,7 @@ pub fn load(path: &Path) -> Result<Loaded, scene::Error> {
     let cancel = AtomicBool::new(false);
     let options = LoadOptions {
         reader: Reader::default(),
+        exact: false,
         smooth: None,
         allow: vec![],
         overrides: vec![],

@@ -61,8 +61,13 @@ fn load(file: &Path, reading: &ReadingArgs) -> Result<Loaded, Failure> {
     let signals =
         Signals::install(&control).map_err(|e| Failure::new(Exit::Internal, "cannot listen for signals").because(e))?;
     let progress = Progress::start(ProgressMode::Auto, &control);
-    let reading =
-        Reading { reader: reading.obj_reader, smooth: None, allow: &reading.allow_path, defines: &reading.define };
+    let reading = Reading {
+        exact: false,
+        reader: reading.obj_reader,
+        smooth: None,
+        allow: &reading.allow_path,
+        defines: &reading.define,
+    };
     render::load(file, &reading, &control, &progress).map_err(|e| match signals.caught() {
         Some(exit) => Failure::new(exit, "stopped"),
         None => e.into(),

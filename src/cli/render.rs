@@ -258,7 +258,13 @@ impl Run<'_> {
     fn read(&self) -> Result<Ready, Failure> {
         let plan = self.plan;
         self.progress.stage(Stage::Read);
-        let reading = Reading { reader: plan.reader, smooth: plan.smooth, allow: &plan.allow, defines: &plan.defines };
+        let reading = Reading {
+            exact: false,
+            reader: plan.reader,
+            smooth: plan.smooth,
+            allow: &plan.allow,
+            defines: &plan.defines,
+        };
         let loaded = load(&plan.input, &reading, self.control, &self.progress)?;
         let mut notices = Notice::about(&loaded);
         let settings = Settings::new(plan, &loaded.render)?;
@@ -338,6 +344,8 @@ impl Run<'_> {
 #[derive(Clone, Copy, Debug)]
 pub struct Reading<'a> {
     pub reader: Reader,
+    /// See [`LoadOptions::exact`].
+    pub exact: bool,
     pub smooth: Option<f64>,
     pub allow: &'a [PathBuf],
     pub defines: &'a [String],
@@ -353,6 +361,7 @@ pub fn load(
     let report = |done: u64, total: u64| progress.report(done as f64 / total.max(1) as f64);
     let options = LoadOptions {
         reader: reading.reader,
+        exact: reading.exact,
         smooth: reading.smooth,
         allow: reading.allow.to_vec(),
         overrides: reading.defines.iter().map(|d| Override::from(d.as_str())).collect(),

@@ -17,6 +17,8 @@ const LARGEST: f32 = 1.844e18;
 pub struct TriangleMesh {
     /// xyz per vertex and at least one float more: Embree reads 16 bytes at a time.
     points: Vec<f32>,
+    /// What rounding to f32 took from each of them; empty where nobody wants to know.
+    rests: Vec<f32>,
     faces: Vec<[u32; 3]>,
     faults: Faults,
     bounds: Bounds,
@@ -60,20 +62,43 @@ impl TriangleMesh {
             points.push(0.0);
         }
         let (faults, bounds) = inspect_all(&points, &mut faces);
-        Self { points, faces, faults, bounds }
+        Self { points, rests: Vec::new(), faces, faults, bounds }
+    }
+
+    /// Keeps what rounding to f32 took from the points: xyz triples likewise, so that
+    /// [`exact_triangle`](Self::exact_triangle) has the corners as they were.
+    ///
+    /// # Panics
+    /// If there is not one for each coordinate.
+    #[must_use]
+    pub fn with_rests(self, rests: Vec<f32>) -> Self {
+        assert_eq!(rests.len(), 3 * self.vertex_count(), "each coordinate has a rest");
+        Self { rests, ..self }
     }
 
     /// The mesh with every vertex where `to` takes it, computed in f64 and rounded once. A triangle
     /// that can no longer be hit there counts with the others.
     #[must_use]
     pub fn moved(mut self, to: &DAffine3) -> Self {
-        let vertices = self.vertex_count();
-        self.points[..3 * vertices].par_chunks_mut(3 * CHUNK).for_each(|chunk| {
-            for p in chunk.chunks_exact_mut(3) {
-                let moved = to.transform_point3(Vec3::from_slice(p).as_dvec3());
-                p.copy_from_slice(&moved.as_vec3().to_array());
-            }
-        });
+        let points = self.points.len() - self.points.len() % 3;
+        let points = self.points[..points].par_chunks_mut(3 * CHUNK);
+        if self.rests.is_empty() {
+            points.for_each(|chunk| {
+                for p in chunk.chunks_exact_mut(3) {
+                    let moved = to.transform_point3(Vec3::from_slice(p).as_dvec3());
+                    p.copy_from_slice(&moved.as_vec3().to_array());
+                }
+            });
+        } else {
+            points.zip(self.rests.par_chunks_mut(3 * CHUNK)).for_each(|(points, rests)| {
+                for (p, rest) in points.chunks_exact_mut(3).zip(rests.chunks_exact_mut(3)) {
+                    let moved = to.transform_point3(whole(p, rest));
+                    let rounded = moved.as_vec3();
+                    p.copy_from_slice(&rounded.to_array());
+                    rest.copy_from_slice(&(moved - rounded.as_dvec3()).as_vec3().to_array());
+                }
+            });
+        }
         let (found, bounds) = inspect_all(&self.points, &mut self.faces);
         // What was bad before has lost its indices, and counts already.
         let faults = self.faults.plus(Faults { out_of_range: 0, ..found });
@@ -136,6 +161,19 @@ impl TriangleMesh {
         self.faces[prim as usize].map(|i| self.point(i))
     }
 
+    /// The same in f64: as they were before they were rounded to f32, to 48 bits, where that was
+    /// [kept](Self::with_rests), and as they are stored where not.
+    ///
+    /// # Panics
+    /// If there is no such triangle, or it is bad.
+    #[must_use]
+    pub fn exact_triangle(&self, prim: u32) -> [DVec3; 3] {
+        self.faces[prim as usize].map(|i| match self.rests.get(3 * i as usize..) {
+            Some(rest) if !rest.is_empty() => whole(&self.points[3 * i as usize..], rest),
+            _ => self.point(i).as_dvec3(),
+        })
+    }
+
     /// Triangles that can never be hit.
     #[must_use]
     pub fn faults(&self) -> Faults {
@@ -151,8 +189,13 @@ impl TriangleMesh {
     /// Bytes of the buffers.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.points[..]) + size_of_val(&self.faces[..])
+        size_of_val(&self.points[..]) + size_of_val(&self.rests[..]) + size_of_val(&self.faces[..])
     }
+}
+
+/// A point and what rounding took from it.
+fn whole(p: &[f32], rest: &[f32]) -> DVec3 {
+    Vec3::from_slice(p).as_dvec3() + Vec3::from_slice(rest).as_dvec3()
 }
 
 /// Triangles or vertices in one unit of work.
@@ -256,6 +299,29 @@ mod tests {
         assert_eq!(moved.bounds(), Bounds { lo: DVec3::new(1.0, 1.0, 3.0), hi: DVec3::new(3.0, 2.0, 3.0) });
         assert_eq!(under.lo.y, 16_777_217.0 * 2f64.powi(-24), "not rounded");
         assert_eq!((under.lo.x, under.hi.x), (1.0, 3.0));
+    }
+
+    #[test]
+    fn what_f32_loses_of_a_corner_can_be_kept() {
+        let exact = [0.1f64, 0.2, 0.3, 1.1, 0.7, -0.4, 0.123_456_789_012, 1.3, 2.2];
+        let points: Vec<f32> = exact.iter().map(|&x| x as f32).collect();
+        let rests = exact.iter().map(|&x| (x - f64::from(x as f32)) as f32).collect();
+        let near = |got: [DVec3; 3], want: [DVec3; 3]| {
+            got.into_iter().zip(want).all(|(a, b)| (a - b).abs().max_element() < 1e-14)
+        };
+        let want = [0, 3, 6].map(|i| DVec3::from_slice(&exact[i..]));
+        let plain = TriangleMesh::new(points.clone(), vec![[0, 1, 2]]);
+        assert_eq!(plain.exact_triangle(0), plain.triangle(0).map(Vec3::as_dvec3));
+        let mesh = TriangleMesh::new(points, vec![[0, 1, 2]]).with_rests(rests);
+        assert!(near(mesh.exact_triangle(0), want));
+        let to = DAffine3::from_scale_rotation_translation(
+            DVec3::new(2.0, 0.3, 1.7),
+            glam::DQuat::from_rotation_y(0.7),
+            DVec3::new(0.3, -0.7, 0.1),
+        );
+        let moved = mesh.moved(&to);
+        assert!(near(moved.exact_triangle(0), want.map(|p| to.transform_point3(p))));
+        assert_eq!(moved.triangle(0), moved.exact_triangle(0).map(DVec3::as_vec3));
     }
 
     #[test]

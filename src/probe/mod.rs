@@ -9,8 +9,9 @@
 //!
 //! Hit or miss is right for every ray that is decidable by 1e-6 of the size of the scene, from up to 1e7 of its sizes
 //! away; `t` is within 2.5e-7 of itself, normals are within 2e-6 radians. The native backend and shapes of either one
-//! do far better, 1e-12, as nothing about them is decided in f32. Triangles of a mesh are the stored ones, whose corners
-//! are f32 in the scene's own space.
+//! do far better, 1e-12, as nothing about them is decided in f32. Triangles of a mesh are found by their
+//! stored corners, which are f32 in the scene's own space, and answered by the file's own where the scene keeps those
+//! ([`LoadOptions::exact`](crate::scene::LoadOptions::exact)).
 //!
 //! ```
 //! use glam::{DAffine3, DVec3};

@@ -39,7 +39,7 @@ impl Surface {
     }
 
     fn of_triangle(scene: &Scene, mesh: &Mesh, placed: Option<&Instance>, ray: &Ray64, hit: &Hit64) -> Self {
-        let corners = mesh.data.triangles.triangle(hit.prim_id).map(Vec3::as_dvec3);
+        let corners = mesh.data.triangles.exact_triangle(hit.prim_id);
         let corners = placed.map_or(corners, |i| corners.map(|p| i.to_scene.transform_point3(p)));
         let at = triangle::refine_exact(ray.o, ray.d, corners, (hit.u, hit.v));
         let weights = [1.0 - at.u - at.v, at.u, at.v];

@@ -17,6 +17,10 @@ pub struct LoadOptions<'a> {
     pub reader: Reader,
     /// Crease angle in degrees for computing normals where the file has none; `None`: flat.
     pub smooth: Option<f64>,
+    /// For who asks about single points: meshes keep what rounding to f32 takes from their corners
+    /// ([`TriangleMesh::exact_triangle`](crate::geom::TriangleMesh::exact_triangle)), and texture coordinates
+    /// that no image needs.
+    pub exact: bool,
     /// Folders besides the file's own that it may name files in.
     pub allow: Vec<PathBuf>,
     /// Keys of a scene file set from outside, in this order.

@@ -45,8 +45,16 @@ pub struct Difference {
 /// # Errors
 /// What our own reader says of a file that it cannot read; what stops both.
 pub fn compare(path: &Path, allow: &[PathBuf], cancel: &AtomicBool) -> Result<Compared, Error> {
-    let options =
-        |reader| ReadOptions { reader, normals: true, uv: Uv::Always, materials: true, allow, cancel, progress: None };
+    let options = |reader| ReadOptions {
+        reader,
+        normals: true,
+        uv: Uv::Always,
+        materials: true,
+        rests: false,
+        allow,
+        cancel,
+        progress: None,
+    };
     let own = obj::read(path, &options(Reader::Own))?;
     let mut compared = Compared {
         path: path.to_owned(),

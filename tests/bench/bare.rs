@@ -27,6 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let cancel = AtomicBool::new(false);
     let options = LoadOptions {
         reader: Reader::Own,
+        exact: false,
         smooth: None,
         allow: vec![],
         overrides: vec![],

@@ -77,6 +77,28 @@ fn rays_at_a_scene_and_at_a_mesh() {
     }
 }
 
+/// A triangle so small beside its neighbour that its corners, rounded to f32, would turn it by a thousandth.
+#[test]
+fn a_mesh_has_the_corners_of_its_file() {
+    let bench = Bench::new();
+    let corners = [[0.70001, 0.3, 0.1], [0.70011, 0.30003, 0.10005], [0.70002, 0.30012, 0.10001]];
+    let lines = corners.map(|[x, y, z]: [f64; 3]| format!("v {x} {y} {z}\n")).concat();
+    bench.write("a.obj", &format!("v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\n{lines}f 1 2 3\nf 4 5 6\n"));
+    let [a, b, c] = corners.map(glam::DVec3::from);
+    let normal = (b - a).cross(c - a).normalize();
+    let target = (a + b + c) / 3.0;
+    let (o, d) = (target + glam::DVec3::new(0.3, 0.1, 2.0), glam::DVec3::new(-0.3, -0.1, -2.0));
+    let ray = json!({"o": o.to_array(), "d": d.to_array()}).to_string();
+    for (backend, reader) in BACKENDS.iter().flat_map(|b| [(b, "own"), (b, "tobj")]) {
+        let answer = &answers(&ask(&bench, &format!("a.obj --backend {backend} --obj-reader {reader}"), &*ray))[0];
+        let vector = |key: &str| glam::DVec3::from_array(std::array::from_fn(|k| answer[key][k].as_f64().unwrap()));
+        assert_eq!(answer["prim"], json!(1), "{backend}, {reader}");
+        assert!((answer["t"].as_f64().unwrap() - 1.0).abs() < 1e-12, "{backend}, {reader}: {answer}");
+        assert!((vector("ng") - normal).length() < 1e-9, "{backend}, {reader}: {answer}");
+        assert!((vector("p") - target).length() < 1e-12, "{backend}, {reader}: {answer}");
+    }
+}
+
 #[test]
 fn numbers_keep_every_bit() {
     let bench = Bench::new();

@@ -16,6 +16,7 @@ pub fn load(toml: &str) -> Loaded {
     let cancel = AtomicBool::new(false);
     let options = LoadOptions {
         reader: Reader::Own,
+        exact: false,
         smooth: None,
         allow: vec![],
         overrides: vec![],

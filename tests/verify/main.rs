@@ -22,6 +22,7 @@ static GO_ON: AtomicBool = AtomicBool::new(false);
 fn load(path: &Path) -> (Scene, CameraDesc) {
     let options = LoadOptions {
         reader: Reader::Own,
+        exact: false,
         smooth: None,
         allow: vec![],
         overrides: vec![],

@@ -34,7 +34,6 @@ use tison::backend::{BackendKind, BuildOptions, ExactMaker};
 use tison::probe::Prober;
 use tison::render::Control;
 use tison::scene::Scene;
-use tison::scene::obj::Reader;
 
 /// What the long help ends with.
 const AFTER_HELP: &str = r#"With SCENE each line is a ray in world space; t counts in units of d, of any length:
@@ -133,13 +132,15 @@ impl Run<'_> {
     fn prober(&self, path: &Path, maker: &ExactMaker, messages: &Messages) -> Result<Prober, Failure> {
         let progress = Progress::start(ProgressMode::Auto, self.control);
         progress.stage(Stage::Read);
-        let (allow, defines) = (&*self.args.reading.allow_path, &*self.args.reading.define);
-        let loaded = render::load(
-            path,
-            &Reading { reader: Reader::Own, smooth: None, allow, defines },
-            self.control,
-            &progress,
-        )?;
+        let reading = &self.args.reading;
+        let reading = Reading {
+            reader: reading.obj_reader,
+            exact: true,
+            smooth: None,
+            allow: &reading.allow_path,
+            defines: &reading.define,
+        };
+        let loaded = render::load(path, &reading, self.control, &progress)?;
         progress.aside(|| messages.warnings(&Notice::about(&loaded), false, "tison check shows all"));
         progress.stage(Stage::Build);
         let report = |share| progress.report(share);

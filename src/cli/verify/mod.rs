@@ -141,6 +141,7 @@ impl<'a> Run<'a, '_> {
         let (started, args) = (Instant::now(), self.args);
         let reading = Reading {
             reader: args.reading.obj_reader,
+            exact: false,
             smooth: None,
             allow: &args.reading.allow_path,
             defines: &args.reading.define,

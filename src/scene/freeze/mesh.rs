@@ -42,8 +42,9 @@ impl MeshFile {
         let read = obj::ReadOptions {
             reader: assets.options.reader,
             normals: true,
-            uv: wanted.uv,
+            uv: if assets.options.exact { Uv::Always } else { wanted.uv },
             materials: wanted.materials,
+            rests: assets.options.exact,
             allow: &assets.options.allow,
             cancel: assets.options.cancel,
             progress,
@@ -53,7 +54,10 @@ impl MeshFile {
         assets.warnings.extend(file.warnings);
         assets.unused.materials += file.counts.unused_materials as usize;
         assets.unused.textures += file.counts.unused_images as usize;
-        let triangles = TriangleMesh::new(file.points, file.faces);
+        let mut triangles = TriangleMesh::new(file.points, file.faces);
+        if let Some(rests) = file.rests {
+            triangles = triangles.with_rests(rests);
+        }
         if triangles.bounds().is_empty() {
             return Err(Error::NothingToHit { path: path.to_owned(), faces: triangles.face_count() });
         }

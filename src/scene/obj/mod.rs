@@ -68,6 +68,8 @@ pub struct ReadOptions<'a> {
     pub uv: Uv,
     /// Whether the file's own materials are wanted. If not, no library is read and every face has none.
     pub materials: bool,
+    /// Whether what rounding to f32 takes from the points is wanted: one more way through the file.
+    pub rests: bool,
     /// Folders, besides the file's own, below which libraries and their images may be.
     pub allow: &'a [PathBuf],
     /// Reading stops soon after this becomes true.
@@ -104,7 +106,7 @@ impl std::fmt::Debug for ReadOptions<'_> {
         let mut f = f.debug_struct("ReadOptions");
         f.field("reader", &self.reader);
         f.field("normals", &self.normals).field("uv", &self.uv).field("materials", &self.materials);
-        f.field("allow", &self.allow).finish_non_exhaustive()
+        f.field("rests", &self.rests).field("allow", &self.allow).finish_non_exhaustive()
     }
 }
 
@@ -116,6 +118,8 @@ pub struct ObjFile {
     /// xyz of every vertex, then one float of padding. Each is the file's number, less the
     /// frame's origin and scaled in f64, rounded to f32 once; all are finite.
     pub points: Vec<f32>,
+    /// What rounding took from each of them, if it is wanted.
+    pub rests: Option<Vec<f32>>,
     /// Vertices of every triangle, in range.
     pub faces: Vec<[u32; 3]>,
     /// Normals, of unit length or zero; absent where no face has any or none are wanted.

@@ -105,7 +105,15 @@ pub(super) fn parse(
 
 /// Writes the points of `text` anew, in another frame. Returns the largest coordinate.
 pub(super) fn parse_points(text: &[u8], frame: &Frame, points: &mut [f32]) -> Result<f64, Trouble> {
-    let mut writer = PointWriter::new(frame, points);
+    each_point(text, PointWriter::new(frame, points))
+}
+
+/// Writes what rounding takes from the points of `text` in their frame.
+pub(super) fn parse_rests(text: &[u8], frame: &Frame, rests: &mut [f32]) -> Result<(), Trouble> {
+    each_point(text, PointWriter { rests: true, ..PointWriter::new(frame, rests) }).map(|_| ())
+}
+
+fn each_point(text: &[u8], mut writer: PointWriter<'_>) -> Result<f64, Trouble> {
     let mut c = Cursor::new(text);
     while !c.at_end() {
         if c.statement() == Statement::Vertex {
@@ -121,13 +129,15 @@ struct PointWriter<'a> {
     origin: DVec3,
     local_per_world: f64,
     slots: std::slice::ChunksExactMut<'a, f32>,
+    /// Whether what is rounded off is written instead.
+    rests: bool,
     reach: f64,
 }
 
 impl<'a> PointWriter<'a> {
     fn new(frame: &Frame, points: &'a mut [f32]) -> Self {
         let slots = points.chunks_exact_mut(3);
-        Self { origin: frame.origin, local_per_world: frame.local_per_world(), slots, reach: 0.0 }
+        Self { origin: frame.origin, local_per_world: frame.local_per_world(), slots, rests: false, reach: 0.0 }
     }
 
     #[inline]
@@ -135,7 +145,9 @@ impl<'a> PointWriter<'a> {
         let world = DVec3::new(coordinate(c)?, coordinate(c)?, coordinate(c)?);
         let local = (world - self.origin) * self.local_per_world;
         self.reach = self.reach.max(local.abs().max_element());
-        self.slots.next().ok_or(Trouble::Changed)?.copy_from_slice(&local.as_vec3().to_array());
+        let rounded = local.as_vec3();
+        let written = if self.rests { (local - rounded.as_dvec3()).as_vec3() } else { rounded };
+        self.slots.next().ok_or(Trouble::Changed)?.copy_from_slice(&written.to_array());
         Ok(())
     }
 

@@ -49,6 +49,7 @@ pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Re
         return Err(no_faces(&pieces, &surveys, &total)?);
     }
     let frame = settle_frame(&pieces, &surveys, &mut arrays, plan.frame, &parsed)?;
+    let rests = if options.rests { Some(rests(&pieces, &surveys, &arrays.points, &frame)?) } else { None };
     arrays.settle_indices(&parsed);
     let clipped = split_polygons(&mut arrays, &surveys, &parsed);
 
@@ -63,6 +64,7 @@ pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Re
         normals: arrays.normal_of.map(|indices| CornerData { values: arrays.normals, indices }),
         uvs: arrays.uv_of.map(|indices| CornerData { values: arrays.uvs, indices }),
         points: arrays.points,
+        rests,
         faces: arrays.faces,
         materials: described.materials,
         counts: Counts {
@@ -256,6 +258,14 @@ fn settle_frame(
         arrays.points.par_iter_mut().for_each(|x| *x = x.clamp(-f32::MAX, f32::MAX));
     }
     Ok(frame)
+}
+
+/// What rounding took from `points`, which are in `frame`.
+fn rests(pieces: &Pieces<'_>, surveys: &[Survey], points: &[f32], frame: &Frame) -> Result<Vec<f32>, Error> {
+    let mut rests = vec![0.0; points.len() - points.len() % 3];
+    let parts = cut(&mut rests, surveys.iter().map(|s| 3 * s.tally.vertices as usize));
+    pieces.each(parts, surveys, |_, rests, text, _| parse::parse_rests(text, frame, rests))?;
+    Ok(rests)
 }
 
 /// Largest coordinate of the vertices that faces use.

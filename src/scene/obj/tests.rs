@@ -12,6 +12,7 @@ static GO_ON: AtomicBool = AtomicBool::new(false);
 fn options() -> ReadOptions<'static> {
     ReadOptions {
         reader: Reader::Own,
+        rests: false,
         normals: true,
         uv: Uv::Always,
         materials: true,

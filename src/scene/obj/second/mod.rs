@@ -66,6 +66,7 @@ pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Re
     let (uv_wanted, mesh) = (options.wants_uv(&materials), mesh);
     Ok(ObjFile {
         points: mesh.points_in(&frame),
+        rests: options.rests.then(|| mesh.rests_in(&frame)),
         frame,
         normals: mesh.normals.finish().filter(|_| options.normals),
         uvs: mesh.uvs.finish().filter(|_| uv_wanted),
@@ -208,6 +209,14 @@ impl Joined {
         let runs: Vec<(usize, u32)> = runs.map(|&(triangles, material)| (triangles, number(material))).collect();
         let of_triangles = runs.iter().flat_map(|&(triangles, material)| std::iter::repeat_n(material, triangles));
         (materials.len() > 1).then(|| of_triangles.collect())
+    }
+
+    fn rests_in(&self, frame: &Frame) -> Vec<f32> {
+        let rest = |&p: &DVec3| {
+            let local = frame.to_local(p);
+            (local - local.as_vec3().as_dvec3()).as_vec3().to_array()
+        };
+        self.points.iter().flat_map(rest).collect()
     }
 
     fn points_in(&self, frame: &Frame) -> Vec<f32> {
