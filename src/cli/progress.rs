@@ -232,11 +232,11 @@ impl View {
         const WIDTH: usize = 32;
         let (name, text) = (self.stage.name(), self.text());
         if self.stage == Stage::Write {
-            return format!("{name:>7}  {text}");
+            return format!("{name:>6}  {text}");
         }
         let full = (self.share * WIDTH as f64) as usize;
         let bar = "█".repeat(full) + &"░".repeat(WIDTH - full);
-        format!("{name:>7} {bar} {:>3.0} %  {text}", 100.0 * self.share)
+        format!("{name:>6} {bar} {:>3.0} %  {text}", 100.0 * self.share)
     }
 
     fn json(&self) -> serde_json::Value {
