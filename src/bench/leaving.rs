@@ -104,6 +104,9 @@ pub struct Found {
     pub rays: u64,
     /// Those that met something.
     pub hits: u64,
+    /// Camera rays that saw the inner side of a mesh, at an edge by rounding or because the backend lost its front:
+    /// what starts there meets the mesh rightly, so that nothing is sent on.
+    pub through: u64,
     /// Most that a shadow ray's start was off the surface, in sizes, as seen from the middle; nothing for a quad,
     /// which has its middle in its surface.
     pub moved: f64,
@@ -156,11 +159,13 @@ pub fn leave(kind: BackendKind, body: Body, size: f64, place: Place, rays: u64) 
             center: (body != Body::Quad).then(|| frame.to_local(at).as_vec3()),
             rays: AtomicU64::new(0),
             hits: AtomicU64::new(0),
+            through: AtomicU64::new(0),
             moved: AtomicU32::new(0),
         };
         render::run_with(scene, &camera, &counting, &job(SIDE), &Control::default()).map_err(Error::Camera)?;
         found.rays += counting.rays.into_inner();
         found.hits += counting.hits.into_inner();
+        found.through += counting.through.into_inner();
         let moved = f64::from(f32::from_bits(counting.moved.into_inner())) * frame.world_per_local() / size;
         found.moved = found.moved.max(moved);
     }
@@ -265,6 +270,7 @@ struct Counting<'a> {
     center: Option<Vec3>,
     rays: AtomicU64,
     hits: AtomicU64,
+    through: AtomicU64,
     /// Bits of a float that is not negative, which order as it does.
     moved: AtomicU32,
 }
@@ -302,7 +308,15 @@ impl Backend for Counting<'_> {
     fn intersect_many(&self, rays: &mut PacketBatch<RayHitPacket>, coherence: Coherence) {
         self.inner.intersect_many(rays, coherence);
         for (packet, live) in rays.packets_mut() {
-            (0..live).for_each(|lane| self.count(&packet.ray.get(lane), packet.hit(lane).is_some()));
+            for lane in 0..live {
+                let (ray, hit) = (packet.ray.get(lane), packet.hit(lane));
+                self.count(&ray, hit.is_some());
+                // Of shapes no normal is reported.
+                if hit.is_some_and(|hit| ray.o == self.eye && hit.ng.dot(ray.d) > 0.0) {
+                    self.through.fetch_add(1, Relaxed);
+                    packet.set_hit(lane, None);
+                }
+            }
         }
     }
 

@@ -306,7 +306,7 @@ const CASES: [(f64, Place); 14] = [
 fn shadows(rays: u64) -> Result<Section, Error> {
     let mut table = Table::new(&["case", "backend"]);
     table.columns.extend(Body::ALL.iter().map(|b| b.name().to_owned()));
-    table.columns.push("moved by at most, sizes".into());
+    table.columns.extend(["moved by at most, sizes".into(), "saw an inner side".into()]);
     let mut data = Vec::new();
     for (size, place) in CASES {
         for &kind in BackendKind::COMPILED {
@@ -316,17 +316,18 @@ fn shadows(rays: u64) -> Result<Section, Error> {
                 Place::Apart(by) => format!("{} sizes from the middle of its scene", number(by)),
             };
             let mut row = vec![case.clone(), kind.name().to_owned()];
-            let mut moved = 0f64;
+            let (mut moved, mut through) = (0f64, 0);
             for body in Body::ALL {
                 let found = leaving::leave(kind, body, size, place, rays)?;
                 moved = moved.max(found.moved);
+                through += found.through;
                 row.push(found.hits.to_string());
                 data.push(json!({
                     "case": case, "backend": kind.name(), "body": body.name(), "rays": found.rays,
-                    "false_hits": found.hits, "moved": found.moved,
+                    "false_hits": found.hits, "moved": found.moved, "saw_inner_side": found.through,
                 }));
             }
-            row.push(format!("{moved:.1e}"));
+            row.extend([format!("{moved:.1e}"), through.to_string()]);
             table.rows.push(row);
         }
     }
@@ -335,8 +336,9 @@ fn shadows(rays: u64) -> Result<Section, Error> {
         title: "False self-hits".into(),
         about: format!(
             "Shadow rays and mirrored rays of the renderer that meet the convex object that they leave, of at least \
-             {rays} in each case. Scenes are read from files with coordinates in f64. The last column is how far \
-             shadow rays start off the surface, as seen from the object's middle."
+             {rays} in each case. Scenes are read from files with coordinates in f64. The last columns are how far \
+             shadow rays start off the surface, as seen from the object's middle, and how many camera rays met a mesh's \
+             inner side first, which are left out."
         ),
         repeat: format!("{} --rays {rays}", repeat(Part::Shadows)),
         table,
