@@ -1,6 +1,6 @@
 //! The box.
 
-use super::shape::{first_inside, size, slab, some_hit, some_lane};
+use super::shape::{first_inside, size, some_hit, some_lane};
 use super::{Bounds, Lanes, Shape, ShapeError, ShapePoint};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
@@ -54,35 +54,25 @@ impl Cube {
         plain.then(|| Self::new(to_world.transform_point3(self.center), self.half * scale).ok()).flatten()
     }
 
+    /// Where the ray enters and leaves each of the three slabs, as fractions over the length of
+    /// the direction along that axis.
     #[inline(always)]
-    fn slabs(&self, o: DVec3, d: DVec3) -> [(f64, f64); 3] {
+    fn slabs(&self, o: DVec3, d: DVec3) -> Slabs {
         let f = o - self.center;
-        [slab(self.half.x, f.x, d.x), slab(self.half.y, f.y, d.y), slab(self.half.z, f.z, d.z)]
+        let f = [along(f.x, d.x), along(f.y, d.y), along(f.z, d.z)];
+        let half = self.half.to_array();
+        Slabs {
+            enter: [0, 1, 2].map(|k| -half[k] - f[k]),
+            leave: [0, 1, 2].map(|k| half[k] - f[k]),
+            over: d.abs().to_array(),
+        }
     }
 
     #[inline(always)]
     fn nearest(&self, o: DVec3, d: DVec3, t_near: f64, t_far: f64) -> f64 {
-        let [x, y, z] = self.slabs(o, d);
-        let enter = greater(greater(x.0, y.0), z.0);
-        let leave = lesser(lesser(x.1, y.1), z.1);
-        // A NaN may drop out of `enter` and `leave`, not out of these.
-        let ok = (x.0 <= x.1) & (y.0 <= y.1) & (z.0 <= z.1) & (enter <= leave);
-        first_inside(enter, leave, t_near, t_far, ok)
-    }
-
-    /// Axis of the face at the nearest hit beyond `t_near` and its side, +1 or -1.
-    fn face(&self, o: DVec3, d: DVec3, t_near: f64) -> (usize, f64) {
         let slabs = self.slabs(o, d);
-        let (mut first, mut last) = (0, 0);
-        for axis in 1..3 {
-            if slabs[axis].0 > slabs[first].0 {
-                first = axis;
-            }
-            if slabs[axis].1 < slabs[last].1 {
-                last = axis;
-            }
-        }
-        if slabs[first].0 > t_near { (first, -d[first].signum()) } else { (last, d[last].signum()) }
+        let (enter, leave) = (slabs.entered(), slabs.left());
+        first_inside(enter.t, leave.t, t_near, t_far, slabs.meet())
     }
 
     /// Axis and side of the face that is nearest to `p`, given from the centre.
@@ -93,15 +83,58 @@ impl Cube {
     }
 }
 
-/// Plain comparisons: `f64::max` looks for NaN, which costs the vector loop instructions.
-#[inline(always)]
-fn greater(a: f64, b: f64) -> f64 {
-    if b > a { b } else { a }
+/// Fractions are compared by their products with each other's denominators, and only the two that matter are
+/// divided. Equal ones stay equal: a ray that meets an edge exactly hits. An axis that the ray does not move along has
+/// nothing to divide by: its products are 0 on one side and tell by the sign whether it starts inside.
+struct Slabs {
+    enter: [f64; 3],
+    leave: [f64; 3],
+    over: [f64; 3],
 }
 
+/// A face that the ray meets.
+struct Meeting {
+    t: f64,
+    axis: usize,
+}
+
+impl Slabs {
+    /// Whether there is a stretch of the ray in all three; not if it has a NaN.
+    #[inline(always)]
+    fn meet(&self) -> bool {
+        let before = |i: usize, j: usize| self.enter[i] * self.over[j] <= self.leave[j] * self.over[i];
+        before(0, 1) & before(1, 0) & before(0, 2) & before(2, 0) & before(1, 2) & before(2, 1)
+    }
+
+    /// Where it enters the last of them; of those at once, that of the least axis.
+    #[inline(always)]
+    fn entered(&self) -> Meeting {
+        self.first(self.enter, |a, b| a > b)
+    }
+
+    /// Where it leaves the first of them.
+    #[inline(always)]
+    fn left(&self) -> Meeting {
+        self.first(self.leave, |a, b| a < b)
+    }
+
+    #[inline(always)]
+    fn first(&self, of: [f64; 3], better: impl Fn(f64, f64) -> bool) -> Meeting {
+        let over = self.over;
+        let takes = |i: usize, best: f64, under: f64| better(of[i] * under, best * over[i]) | (under == 0.0);
+        let y = takes(1, of[0], over[0]);
+        let (best, under) = if y { (of[1], over[1]) } else { (of[0], over[0]) };
+        let z = takes(2, best, under);
+        let (best, under) = if z { (of[2], over[2]) } else { (best, under) };
+        let axis = if y { 1 } else { 0 };
+        Meeting { t: best / under, axis: if z { 2 } else { axis } }
+    }
+}
+
+/// `x` on an axis that runs with `d`: negated where that is negative.
 #[inline(always)]
-fn lesser(a: f64, b: f64) -> f64 {
-    if b < a { b } else { a }
+fn along(x: f64, d: f64) -> f64 {
+    f64::from_bits(x.to_bits() ^ (d.to_bits() & (1 << 63)))
 }
 
 impl Shape for Cube {
@@ -131,21 +164,32 @@ impl Shape for Cube {
     }
 
     #[inline]
-    fn refine_for(&self, o: DVec3, d: DVec3, t_near: f64, t: f64, _: bool) -> ShapePoint {
-        let own = self.hit(o, d, t_near, f64::INFINITY);
-        let t = own.unwrap_or(t);
+    fn refine_for(&self, o: DVec3, d: DVec3, t_near: f64, t: f64, uv: bool) -> ShapePoint {
+        let slabs = self.slabs(o, d);
+        let (enter, leave) = (slabs.entered(), slabs.left());
+        let own = first_inside(enter.t, leave.t, t_near, f64::INFINITY, slabs.meet());
+        let found = own < f64::INFINITY;
+        let t = if found { own } else { t };
         let mut p = ((o - self.center) + t * d).clamp(-self.half, self.half);
-        let (axis, side) = if own.is_some() { self.face(o, d, t_near) } else { self.face_near(p) };
+        let (axis, side) = match found {
+            true if enter.t > t_near => (enter.axis, -d[enter.axis].signum()),
+            true => (leave.axis, d[leave.axis].signum()),
+            false => self.face_near(p),
+        };
         p[axis] = side * self.half[axis];
         let ng = side * DVec3::AXES[axis];
-        let q = p / self.half;
-        let uv = match axis {
-            0 => DVec2::new(-side * q.z, -q.y),
-            1 => DVec2::new(q.x, side * q.z),
-            _ => DVec2::new(side * q.x, -q.y),
+        let map = || {
+            let q = p / self.half;
+            let uv = match axis {
+                0 => DVec2::new(-side * q.z, -q.y),
+                1 => DVec2::new(q.x, side * q.z),
+                _ => DVec2::new(side * q.x, -q.y),
+            };
+            0.5 + 0.5 * uv
         };
+        let uv = if uv { map() } else { DVec2::ZERO };
         let part = 2 * axis as u8 + u8::from(side > 0.0);
         let extent = self.half.max_element();
-        ShapePoint { t, p: self.center + p, ng, uv: 0.5 + 0.5 * uv, extent, part }
+        ShapePoint { t, p: self.center + p, ng, uv, extent, part }
     }
 }

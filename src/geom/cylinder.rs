@@ -1,6 +1,6 @@
 //! The cylinder: a tube, or a solid with two lids.
 
-use super::shape::{Roots, first_inside, size, slab, some_hit, some_lane};
+use super::shape::{Roots, first_inside, inverse_length, size, slab, some_hit, some_lane};
 use super::{Bounds, Lanes, Shape, ShapeError, ShapePoint};
 use glam::{DAffine3, DVec2, DVec3};
 use std::f64::consts::TAU;
@@ -103,16 +103,21 @@ impl Cylinder {
         first_inside(enter, leave, t_near, t_far, ok)
     }
 
-    /// Which part the nearest hit beyond `t_near` is on.
-    fn part(&self, o: DVec3, d: DVec3, t_near: f64) -> u8 {
+    /// The nearest hit beyond `t_near`, infinity for none, and the part it is on.
+    #[inline]
+    fn nearest_part(&self, o: DVec3, d: DVec3, t_near: f64) -> (f64, u8) {
+        let flat = self.flat(o, d);
         if !self.capped {
-            return 0;
+            return (self.nearest_open(&flat, o, d, t_near, f64::INFINITY), 0);
         }
-        let wall = Self::inside_wall(&self.flat(o, d));
+        let wall = Self::inside_wall(&flat);
         let caps = slab(self.half, o.z, d.z);
-        let (on_cap, top) =
-            if wall.0.max(caps.0) > t_near { (caps.0 > wall.0, d.z < 0.0) } else { (caps.1 < wall.1, d.z > 0.0) };
-        if on_cap { 1 + u8::from(top) } else { 0 }
+        let (caps_last, caps_first) = (caps.0 > wall.0, caps.1 < wall.1);
+        let enter = if caps_last { caps.0 } else { wall.0 };
+        let leave = if caps_first { caps.1 } else { wall.1 };
+        let t = first_inside(enter, leave, t_near, f64::INFINITY, (caps.0 <= caps.1) & (enter <= leave));
+        let (on_cap, top) = if enter > t_near { (caps_last, d.z < 0.0) } else { (caps_first, d.z > 0.0) };
+        (t, if on_cap { 1 + u8::from(top) } else { 0 })
     }
 
     /// The part that is nearest to `p`.
@@ -177,23 +182,30 @@ impl Shape for Cylinder {
 
     #[inline]
     fn refine_for(&self, o: DVec3, d: DVec3, t_near: f64, t: f64, uv: bool) -> ShapePoint {
-        let own = self.hit(o, d, t_near, f64::INFINITY);
-        let t = own.unwrap_or(t);
+        let (own, part) = self.nearest_part(o, d, t_near);
+        let found = own < f64::INFINITY;
+        let t = if found { own } else { t };
         let p = o + t * d;
-        let part = if own.is_some() { self.part(o, d, t_near) } else { self.part_near(p) };
+        let part = if found { part } else { self.part_near(p) };
         let extent = self.radius.max(self.half);
         if part == 0 {
-            let n = p.truncate().normalize_or(DVec2::X);
+            let flat = p.truncate();
+            let n = flat * inverse_length(flat.length_squared(), self.radius);
+            let n = if n.is_finite() { n } else { DVec2::X };
             let viewed = if n.dot(d.truncate()) > 0.0 { -n } else { n };
             let turn = if uv { viewed.y.atan2(viewed.x) / TAU } else { 0.0 };
             let z = p.z.clamp(-self.half, self.half);
-            let uv = DVec2::new(if turn < 0.0 { 1.0 + turn } else { turn }, 0.5 - 0.5 * (z / self.half));
+            let down = if uv { 0.5 - 0.5 * (z / self.half) } else { 0.0 };
+            let uv = DVec2::new(if turn < 0.0 { 1.0 + turn } else { turn }, down);
             return ShapePoint { t, p: (self.radius * n).extend(z), ng: n.extend(0.0), uv, extent, part };
         }
         let side = if part == 2 { 1.0 } else { -1.0 };
         let p = p.truncate().clamp_length_max(self.radius);
-        let q = p / self.radius;
-        let uv = DVec2::new(0.5 + 0.5 * side * q.x, 0.5 - 0.5 * q.y);
+        let map = || {
+            let q = p / self.radius;
+            DVec2::new(0.5 + 0.5 * side * q.x, 0.5 - 0.5 * q.y)
+        };
+        let uv = if uv { map() } else { DVec2::ZERO };
         ShapePoint { t, p: p.extend(side * self.half), ng: side * DVec3::Z, uv, extent, part }
     }
 }

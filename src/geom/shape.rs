@@ -175,6 +175,19 @@ impl Roots {
     }
 }
 
+/// `1 / sqrt(squared)`; where that is about `1 / expected`, one step of Newton's from there instead of the root.
+///
+/// The step leaves 3/8 of the square of what the argument was off, relatively: nothing below 1e-8.
+#[inline(always)]
+pub(super) fn inverse_length(squared: f64, expected: f64) -> f64 {
+    let wanted = expected * expected;
+    if (squared - wanted).abs() <= 1e-8 * wanted {
+        (1.5 * wanted - 0.5 * squared) / (wanted * expected)
+    } else {
+        1.0 / squared.sqrt()
+    }
+}
+
 /// The part of a ray between the planes `-half` and `half` of one axis; `near > far` when there is none,
 /// and NaN when the ray has one.
 ///

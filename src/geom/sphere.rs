@@ -1,6 +1,6 @@
 //! The sphere.
 
-use super::shape::{Roots, first_inside, size, some_hit, some_lane};
+use super::shape::{Roots, first_inside, inverse_length, size, some_hit, some_lane};
 use super::{Bounds, Lanes, Shape, ShapeError, ShapePoint};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
@@ -126,7 +126,9 @@ impl Shape for Sphere {
     #[inline]
     fn refine_for(&self, o: DVec3, d: DVec3, t_near: f64, t: f64, uv: bool) -> ShapePoint {
         let t = self.hit(o, d, t_near, f64::INFINITY).unwrap_or(t);
-        let ng = ((o - self.center) + t * d).normalize_or(-d.normalize_or(DVec3::Z));
+        let p = (o - self.center) + t * d;
+        let ng = p * inverse_length(p.length_squared(), self.radius);
+        let ng = if ng.is_finite() { ng } else { -d.normalize_or(DVec3::Z) };
         let n = if d.dot(ng) > 0.0 { -ng } else { ng };
         let map = || DVec2::new(0.5 + (-n.x).atan2(-n.z) / TAU, 0.5 - n.y.clamp(-1.0, 1.0).asin() / PI);
         let uv = if uv { map() } else { DVec2::ZERO };
