@@ -11,8 +11,9 @@
 //! | [`render`] | tiles, waves of rays, shading |
 //! | [`probe`] | single rays in f64, exact answers |
 //! | [`backend`] | the seam: who answers a ray |
-//! | [`film`] | pixels in, files out |
+//! | [`metrics`] | how far two pictures are apart |
 //! | [`scene`] | files in, one frozen scene out |
+//! | [`film`] | pixels in, files out, and pictures back in |
 //! | [`geom`] | rays, hits, packets, primitives |
 //! | [`math`] | floats, colour, samples |
 //!
@@ -35,6 +36,7 @@ pub mod embree;
 pub mod film;
 pub mod geom;
 pub mod math;
+pub mod metrics;
 pub mod probe;
 pub mod render;
 pub mod scene;

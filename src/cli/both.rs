@@ -7,7 +7,8 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tison::backend::BackendKind;
-use tison::film::{self, Difference};
+use tison::film;
+use tison::metrics::Difference;
 
 /// Who answers the rays of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -133,9 +134,9 @@ impl Comparison {
         let pixels = d.image.color.len() as u64;
         let before = self.mean_square * self.pixels as f64;
         self.pixels += pixels;
-        self.differing += d.pixels;
-        self.mean_square = (before + d.rmse * d.rmse * pixels as f64) / self.pixels.max(1) as f64;
-        self.max = self.max.max(d.max);
+        self.differing += d.values.differing;
+        self.mean_square = (before + d.values.rmse * d.values.rmse * pixels as f64) / self.pixels.max(1) as f64;
+        self.max = self.max.max(d.values.max);
         self.scale = scale;
     }
 

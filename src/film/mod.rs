@@ -1,8 +1,8 @@
-//! Finished pixels and the files they go to. Knows `math` and nothing else.
+//! Finished pixels, the files they go to, and pictures read back from files. Knows `math` and nothing else.
 
 mod aov;
-mod difference;
 mod format;
+mod read;
 mod save;
 mod tone;
 mod write;
@@ -10,8 +10,9 @@ mod write;
 use rayon::prelude::*;
 
 pub use aov::{Aov, AovImage};
-pub use difference::Difference;
 pub use format::Format;
+pub(crate) use read::Decoder;
+pub use read::{Encoding, Picture, ReadError, read};
 pub use save::{SaveError, Sink, abandon, check_target, is_special_file, save};
 pub use tone::{Display, Tonemap};
 pub use write::{Notes, encode, files, save_all};

@@ -1,4 +1,5 @@
-//! From files to one frozen scene. Knows `geom` and `math`; never which backend runs.
+//! From files to one frozen scene. Knows `geom`, `math` and how `film` decodes
+//! images; never which backend runs.
 //!
 //! The scene lives in its own space: the file's coordinates less an f64 origin, scaled by a
 //! power of two to a size of about 1, so that f32 spends its digits on the shape and not on

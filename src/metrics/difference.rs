@@ -1,6 +1,7 @@
-//! How two films of the same size differ.
+//! How two films of the same size differ, as a film.
 
-use super::Film;
+use super::values::{self, Values};
+use crate::film::{Encoding, Film};
 use rayon::prelude::*;
 
 /// The difference of two films.
@@ -8,12 +9,8 @@ use rayon::prelude::*;
 pub struct Difference {
     /// Absolute differences of the linear colours, channel by channel.
     pub image: Film,
-    /// Pixels with any.
-    pub pixels: u64,
-    /// Root of the mean of their squares, over all pixels and channels.
-    pub rmse: f64,
-    /// The largest.
-    pub max: f64,
+    /// The figures of them.
+    pub values: Values,
 }
 
 impl Difference {
@@ -27,24 +24,19 @@ impl Difference {
         let pairs = a.color.par_iter().zip(&b.color);
         let color: Vec<[f32; 3]> =
             pairs.map(|(a, b)| std::array::from_fn(|channel| (a[channel] - b[channel]).abs())).collect();
-        let pixels = color.par_iter().filter(|c| **c != [0.0; 3]).count() as u64;
-        // In order, so that the sum is the same for any number of threads.
-        let values = || color.as_flattened().iter().map(|&x| f64::from(x));
-        let squares: f64 = values().map(|x| x * x).sum();
-        let rmse = (squares / (3 * color.len()).max(1) as f64).sqrt();
-        let max = values().fold(0.0, f64::max);
+        let (values, _) = values::of(&a.color, &b.color, a.width, Encoding::Linear);
         let finished = color.len();
         let image = Film { width: a.width, height: a.height, color, aovs: Vec::new(), finished };
-        Self { image, pixels, rmse, max }
+        Self { image, values }
     }
 
     /// The image with its largest value at 1, and what it was multiplied by; as it is where there is no difference.
     #[must_use]
     pub fn scaled(&self) -> (Film, f64) {
-        if self.max == 0.0 {
+        if self.values.max == 0.0 {
             return (self.image.clone(), 1.0);
         }
-        let scale = 1.0 / self.max;
+        let scale = 1.0 / self.values.max;
         let mut image = self.image.clone();
         image.color.par_iter_mut().for_each(|c| *c = c.map(|x| (f64::from(x) * scale) as f32));
         (image, scale)
@@ -65,11 +57,11 @@ mod tests {
         let b = film(&[[0.25, 0.0, 1.5], [0.25; 3]]);
         let d = Difference::of(&a, &b);
         assert_eq!(d.image.color, [[0.25, 0.0, 0.5], [0.0; 3]]);
-        assert_eq!((d.pixels, d.max), (1, 0.5));
-        assert!((d.rmse - ((0.0625f64 + 0.25) / 6.0).sqrt()).abs() < 1e-15);
+        assert_eq!((d.values.differing, d.values.max), (1, 0.5));
+        assert!((d.values.rmse - ((0.0625f64 + 0.25) / 6.0).sqrt()).abs() < 1e-15);
         let (scaled, scale) = d.scaled();
         assert_eq!((scaled.color[0], scale), ([0.5, 0.0, 1.0], 2.0));
         let none = Difference::of(&a, &a);
-        assert_eq!((none.pixels, none.rmse, none.max, none.scaled().1), (0, 0.0, 0.0, 1.0));
+        assert_eq!((none.values.differing, none.values.rmse, none.values.max, none.scaled().1), (0, 0.0, 0.0, 1.0));
     }
 }
