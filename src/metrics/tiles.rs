@@ -33,6 +33,7 @@ impl Tile {
 
     /// Red, green and blue of `long` by `long` pixels, of which the tile's first has `margin` before it in both
     /// directions: from 0 to 1 as a display shows them, NaN as 0. Beyond the picture its outermost pixels go on.
+    #[expect(clippy::manual_clamp, reason = "of NaN and 0 `max` takes 0, where `clamp` keeps the NaN")]
     #[inline(always)]
     pub fn gather(&self, of: &Picture, margin: usize, long: usize) -> [Vec<f64>; 3] {
         let (width, height) = (of.width as usize, of.height as usize);
@@ -46,7 +47,6 @@ impl Tile {
             let (red, green, blue) = (&mut red[to.clone()], &mut green[to.clone()], &mut blue[to]);
             for x in 0..long {
                 let pixel = row[(self.x + x).saturating_sub(margin).min(width - 1)];
-                // The lower bound first: of NaN and 0 `max` takes 0.
                 red[x] = (f64::from(pixel[0]) * unit).max(0.0).min(1.0);
                 green[x] = (f64::from(pixel[1]) * unit).max(0.0).min(1.0);
                 blue[x] = (f64::from(pixel[2]) * unit).max(0.0).min(1.0);

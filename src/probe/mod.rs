@@ -31,8 +31,8 @@
 mod sight;
 mod surface;
 
-use crate::backend::{BackendKind, BuildOptions, Error, ExactBackend, ExactMaker};
-use crate::geom::{Hit64, Ray64};
+use crate::backend::{AnyBackend, BackendKind, BuildOptions, Error, ExactBackend, ExactMaker};
+use crate::geom::{Hit64, Ray, Ray64};
 use crate::scene::Scene;
 use glam::{DVec2, DVec3};
 use sight::Sight;
@@ -89,7 +89,14 @@ pub struct Answer {
 #[derive(Debug)]
 pub struct Prober {
     scene: Arc<Scene>,
-    backend: ExactBackend,
+    backend: Tracer,
+}
+
+#[derive(Debug)]
+enum Tracer {
+    Exact(ExactBackend),
+    /// Sees rays rounded to f32, as a render sends them.
+    Rounded(AnyBackend),
 }
 
 /// Hits that are turned away one after the other before a ray is given up: as many triangles may meet in its start.
@@ -112,7 +119,18 @@ impl Prober {
     /// As [`ExactMaker::build`].
     pub fn build(scene: impl Into<Arc<Scene>>, maker: &ExactMaker, options: &BuildOptions<'_>) -> Result<Self, Error> {
         let scene = scene.into();
-        let backend = maker.build(&scene, options)?;
+        let backend = Tracer::Exact(maker.build(&scene, options)?);
+        Ok(Self { scene, backend })
+    }
+
+    /// A prober that asks what a render would ask: rays are rounded to f32 in scene space, and the backend's first word
+    /// is taken, whatever it missed. The hit itself is computed in f64.
+    ///
+    /// # Errors
+    /// As [`AnyBackend::build`].
+    pub fn rounded(scene: impl Into<Arc<Scene>>, kind: BackendKind, options: &BuildOptions<'_>) -> Result<Self, Error> {
+        let scene = scene.into();
+        let backend = Tracer::Rounded(AnyBackend::build(kind, &scene, options)?);
         Ok(Self { scene, backend })
     }
 
@@ -126,15 +144,39 @@ impl Prober {
     /// finite (`t_max` may be infinity).
     #[must_use]
     pub fn probe(&self, ray: &ProbeRay) -> Option<Answer> {
-        let sight = Sight::new(ray, &self.scene.frame, &self.backend.clip())?;
-        let hits = self.backend.hits_along(&sight.ray);
-        let nearest = self.first(ray, &sight, f64::INFINITY, self.backend.slack(), hits);
+        match &self.backend {
+            Tracer::Exact(backend) => self.exact(backend, ray),
+            Tracer::Rounded(backend) => self.first_word(backend, ray),
+        }
+    }
+
+    fn exact(&self, backend: &ExactBackend, ray: &ProbeRay) -> Option<Answer> {
+        let sight = Sight::new(ray, &self.scene.frame, &backend.clip())?;
+        let hits = backend.hits_along(&sight.ray);
+        let nearest = self.first(ray, &sight, f64::INFINITY, backend.slack(), hits);
         // Nearer than that by more than rounding, in case the ray slipped through between triangles.
-        let t_far = nearest.as_ref().map_or(sight.ray.t_far, |(s, _)| s - 2.0 * self.backend.slack());
+        let t_far = nearest.as_ref().map_or(sight.ray.t_far, |(s, _)| s - 2.0 * backend.slack());
         let nearer = Ray64 { t_far, ..sight.ray };
-        let beside = if t_far > nearer.t_near { self.backend.hits_beside(&nearer) } else { None };
-        let missed = beside.and_then(|hits| self.first(ray, &sight, t_far, self.backend.slack_beside(), hits));
+        let beside = if t_far > nearer.t_near { backend.hits_beside(&nearer) } else { None };
+        let missed = beside.and_then(|hits| self.first(ray, &sight, t_far, backend.slack_beside(), hits));
         missed.or(nearest).map(|(_, answer)| answer)
+    }
+
+    fn first_word(&self, backend: &AnyBackend, ray: &ProbeRay) -> Option<Answer> {
+        let frame = &self.scene.frame;
+        let rounded = Ray {
+            o: frame.to_local(ray.o).as_vec3(),
+            d: (ray.d * frame.local_per_world()).as_vec3(),
+            t_near: ray.t_min as f32,
+            t_far: ray.t_max as f32,
+        };
+        let hit = backend.as_dyn().intersect(&rounded)?;
+        let (t, u, v) = (hit.t.into(), hit.u.into(), hit.v.into());
+        let hit = Hit64 { t, u, v, prim_id: hit.prim_id, geom_id: hit.geom_id };
+        let (t_near, t_far) = (rounded.t_near.into(), rounded.t_far.into());
+        let line = Ray64 { o: rounded.o.as_dvec3(), d: rounded.d.as_dvec3(), t_near, t_far };
+        let surface = Surface::of(&self.scene, &line, &hit, t_near);
+        Some(surface.answer(&self.scene, &hit, surface.t))
     }
 
     /// The first of `hits` that counts, and its parameter along `sight`: inside the ray's interval, before `t_far`, and no
@@ -148,7 +190,8 @@ impl Prober {
         hits: impl Iterator<Item = Hit64>,
     ) -> Option<(f64, Answer)> {
         let answers = hits.take(MOST_HITS).map(|hit| {
-            let surface = Surface::of(&self.scene, &sight.ray, &hit);
+            // Beyond anything before it, so that the formula of a shape finds this hit again.
+            let surface = Surface::of(&self.scene, &sight.ray, &hit, hit.t.next_down());
             let t = sight.t(surface.t);
             let counts = surface.off <= slack && surface.t < t_far && t > ray.t_min && t < ray.t_max;
             counts.then(|| (surface.t, surface.answer(&self.scene, &hit, t)))

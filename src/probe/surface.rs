@@ -22,12 +22,10 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Where `ray` meets what was hit.
-    pub fn of(scene: &Scene, ray: &Ray64, hit: &Hit64) -> Self {
+    /// Where `ray` meets what was hit. Beyond `before` its shape is not met until there.
+    pub fn of(scene: &Scene, ray: &Ray64, hit: &Hit64, before: f64) -> Self {
         match &scene.objects[hit.geom_id as usize] {
             Object::Shapes(shapes) => {
-                // Beyond anything before it, so that the formula finds this hit again.
-                let before = hit.t.next_down();
                 let at = with_shapes!(&shapes.set, set => set.refine(hit.prim_id, ray.o, ray.d, before, hit.t));
                 let n = facing(at.ng, ray.d);
                 let entering = at.entering(ray.d);

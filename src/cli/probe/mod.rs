@@ -54,6 +54,9 @@ pub struct ProbeArgs {
     /// Who answers the rays
     #[arg(long, value_name = "NAME", value_parser = Backends::parser_of_one())]
     pub backend: Option<BackendKind>,
+    /// Round rays to f32 and take the first word of the backend, as a render does
+    #[arg(long)]
+    pub as_rendered: bool,
     /// How rays come and answers go
     #[arg(long, value_enum, default_value = "jsonl")]
     pub format: Format,
@@ -84,6 +87,10 @@ pub fn probe(args: &ProbeArgs, messages: &Messages) -> Result<Exit, Failure> {
         Some(scene) => Input::of(scene).check_reading(&args.reading, scene)?,
         None if args.format == Format::Npy => {
             return Err(Failure::usage("--format npy has no room for shapes").help("name a scene: tison probe SCENE"));
+        }
+        None if args.as_rendered => {
+            return Err(Failure::usage("--as-rendered is about the rays of a render, and no scene is named")
+                .help("name a scene: tison probe SCENE --as-rendered"));
         }
         None if !args.reading.define.is_empty() => {
             return Err(Failure::usage("-D sets keys of a scene file, and none is named"));
@@ -152,6 +159,11 @@ impl Run<'_> {
             progress: Some(&report),
         };
         let scene: Scene = loaded.scene;
-        Prober::build(scene, maker, &options).map_err(|e| render::build_failure(&e))
+        let built = if self.args.as_rendered {
+            Prober::rounded(scene, self.kind, &options)
+        } else {
+            Prober::build(scene, maker, &options)
+        };
+        built.map_err(|e| render::build_failure(&e))
     }
 }

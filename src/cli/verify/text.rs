@@ -76,7 +76,7 @@ fn cases(report: &Report, story: &Story<'_>, out: &mut String) {
 fn told(case: &Case, frame: &Frame, file: &str) -> String {
     let [embree, native] = &case.answers;
     format!(
-        "{}, {}: Embree says {embree}, native {native}\n    echo '{}' | tison probe {} --backend embree",
+        "{}, {}: Embree says {embree}, native {native}\n    echo '{}' | tison probe {} --as-rendered --backend embree",
         case.class.name(),
         case.group.name(),
         case.probe_line(frame),

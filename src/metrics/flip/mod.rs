@@ -75,7 +75,7 @@ impl Kernel for Part<'_> {
         let b = Seen::of(self.pictures[1], self.tile, self.filters);
         let mut errors = vec![0.0; AREA];
         let scale = 1.0 / self.farthest;
-        for i in 0..AREA {
+        for (i, error) in errors.iter_mut().enumerate() {
             let (dl, da, db) = (a.lightness[i] - b.lightness[i], a.red[i] - b.red[i], a.yellow[i] - b.yellow[i]);
             // Rounding must not take the farthest colours beyond 1.
             let apart = ((dl.abs() + (da * da + db * db).sqrt()) * scale).min(1.0);
@@ -85,7 +85,7 @@ impl Kernel for Part<'_> {
             let colour = if power < KNEE { below } else { above };
             let (edge, point) = ((a.edges[i] - b.edges[i]).abs(), (a.points[i] - b.points[i]).abs());
             let feature = (edge.max(point) * std::f64::consts::FRAC_1_SQRT_2).min(1.0);
-            errors[i] = pow01(colour.min(1.0), 1.0 - feature.sqrt());
+            *error = pow01(colour.min(1.0), 1.0 - feature.sqrt());
         }
         errors
     }
