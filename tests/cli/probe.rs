@@ -83,7 +83,7 @@ fn a_mesh_has_the_corners_of_its_file() {
     let bench = Bench::new();
     let corners = [[0.70001, 0.3, 0.1], [0.70011, 0.30003, 0.10005], [0.70002, 0.30012, 0.10001]];
     let lines = corners.map(|[x, y, z]: [f64; 3]| format!("v {x} {y} {z}\n")).concat();
-    bench.write("a.obj", &format!("v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\n{lines}f 1 2 3\nf 4 5 6\n"));
+    bench.write("a.obj", format!("v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\n{lines}f 1 2 3\nf 4 5 6\n"));
     let [a, b, c] = corners.map(glam::DVec3::from);
     let normal = (b - a).cross(c - a).normalize();
     let target = (a + b + c) / 3.0;
