@@ -152,8 +152,8 @@ fn black_and_white_are_as_far_apart_as_can_be() {
     near("smape", values.smape, 1.0 / 1.01, 1e-12);
     // Wang et al.: C1 / (1 + C1), as neither varies.
     near("ssim", ssim.expect("the window fits"), 1e-4 / (1.0 + 1e-4), 1e-12);
-    // flip-evaluator 1.7.
-    near("flip", flip.mean, 0.9673985242843628, 1e-6);
+    // flip-evaluator 1.7, in f32: what rounding leaves of the edges of a plain picture, 3e-7, enters under a root.
+    near("flip", flip.mean, 0.9673985242843628, 1e-4);
 }
 
 #[test]
