@@ -25,7 +25,7 @@ Exit codes:
   2  wrong usage
   3  the scene or a file it names is at fault
   4  the output could not be written
-  5  a comparison found a difference (tison verify)
+  5  a comparison found a difference (tison verify, tison compare)
   6  refused by a limit (memory, size)
   70 internal error
   130, 143  stopped by SIGINT or SIGTERM; what was rendered is saved";
@@ -75,6 +75,9 @@ pub enum Command {
     /// Send the same rays through both backends and read meshes with both readers, and compare
     #[command(after_long_help = super::verify::AFTER_HELP)]
     Verify(super::verify::VerifyArgs),
+    /// Tell how far two pictures are apart: RMSE, PSNR, SSIM, FLIP and more, and a picture of it
+    #[command(after_long_help = super::compare::AFTER_HELP)]
+    Compare(super::compare::CompareArgs),
     /// Answer single rays exactly: rays on stdin, hits on stdout
     Probe(ProbeArgs),
     /// Write an example; without a name, list them

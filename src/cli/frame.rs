@@ -41,7 +41,8 @@ fn scaled(size: (u64, u64), scale: f64) -> Result<(u32, u32), Failure> {
     Ok((w as u32, h as u32))
 }
 
-fn crop(region: Option<Region>, (width, height): (u32, u32)) -> Result<Crop, Failure> {
+/// The pixels of a region, which must hold some and not reach beyond the image.
+pub fn crop(region: Option<Region>, (width, height): (u32, u32)) -> Result<Crop, Failure> {
     let whole = Crop { x0: 0, y0: 0, x1: width, y1: height };
     let sides = [width, height, width, height];
     let edges = match region {

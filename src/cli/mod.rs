@@ -7,6 +7,7 @@ mod args;
 mod bench;
 mod both;
 mod camera;
+mod compare;
 mod config;
 mod example;
 mod exit;
@@ -78,6 +79,7 @@ fn run(cli: Cli) -> Exit {
         Some(Command::Info(args)) => info::info(&args, &messages),
         Some(Command::Check(args)) => info::check(&args, &messages),
         Some(Command::Verify(args)) => verify::verify(&args, &messages),
+        Some(Command::Compare(args)) => compare::compare(&args, &messages),
         Some(Command::Probe(args)) => probe::probe(&args, &messages),
         Some(Command::Example { name }) => example::example(name.as_ref(), &messages),
         Some(Command::Bench { what }) => bench::bench(&what, &messages),

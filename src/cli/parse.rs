@@ -105,6 +105,18 @@ pub fn exposure(s: &str) -> Result<f32, String> {
     if v.abs() <= 64.0 { Ok(v as f32) } else { Err("expected an exposure from -64 to 64".into()) }
 }
 
+/// 0 or more.
+pub fn bound(s: &str) -> Result<f64, String> {
+    let v = finite(s)?;
+    if v >= 0.0 { Ok(v) } else { Err("expected 0 or more".into()) }
+}
+
+/// Pixels to a degree of the eye's field.
+pub fn pixels_per_degree(s: &str) -> Result<f64, String> {
+    let v = finite(s)?;
+    if (1.0..=1000.0).contains(&v) { Ok(v) } else { Err("expected 1 to 1000 pixels per degree".into()) }
+}
+
 /// `path.to.key=value`; the scene file's reader says whether there is such a key.
 pub fn define(s: &str) -> Result<String, String> {
     match s.split_once('=') {
@@ -204,6 +216,8 @@ mod tests {
         assert!(weight("1.1").is_err() && weight("nan").is_err());
         assert_eq!(exposure("-1.5"), Ok(-1.5));
         assert!(exposure("64").is_ok() && exposure("65").is_err() && exposure("nan").is_err());
+        assert!(bound("0").is_ok() && bound("-1").is_err() && bound("nan").is_err() && bound("inf").is_err());
+        assert!(pixels_per_degree("67").is_ok() && pixels_per_degree("0.9").is_err());
         assert!(define("a.b=1").is_ok() && define("a.b=").is_ok());
         assert!(define("a.b").is_err() && define("=1").is_err() && define("").is_err());
         assert_eq!(pixel("3,4"), Ok((3, 4)));

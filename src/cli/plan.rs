@@ -219,7 +219,7 @@ fn each_once(aovs: &[Aov]) -> Vec<Aov> {
 }
 
 /// Whether both names lead to one file that exists.
-fn same_file(a: &Path, b: &Path) -> bool {
+pub fn same_file(a: &Path, b: &Path) -> bool {
     match (fs::metadata(a), fs::metadata(b)) {
         (Ok(a), Ok(b)) => a.dev() == b.dev() && a.ino() == b.ino(),
         _ => false,

@@ -78,6 +78,26 @@ pub fn bytes(n: u64) -> String {
     if unit == 0 { format!("{n} B") } else { format!("{value:.1} {}", UNITS[unit]) }
 }
 
+/// Six digits: `0.001234`, `12.3457`, `1.23457e-5`; `infinite`; `none` for NaN.
+pub fn figure(v: f64) -> String {
+    const DIGITS: i32 = 6;
+    if v.is_nan() {
+        return "none".into();
+    }
+    if v.is_infinite() {
+        return if v > 0.0 { "infinite".into() } else { "-infinite".into() };
+    }
+    let exponent = if v == 0.0 { 0 } else { v.abs().log10().floor() as i32 };
+    let trimmed =
+        |s: &str| if s.contains('.') { s.trim_end_matches('0').trim_end_matches('.').to_owned() } else { s.into() };
+    if (-4..DIGITS).contains(&exponent) {
+        return trimmed(&format!("{v:.*}", (DIGITS - 1 - exponent) as usize));
+    }
+    let text = format!("{v:.*e}", (DIGITS - 1) as usize);
+    let (mantissa, exponent) = text.split_once('e').expect("it is written with one");
+    format!("{}e{exponent}", trimmed(mantissa))
+}
+
 /// `0.123 s`, `12.3 s`, `4:05`, `2:03:04`.
 pub fn seconds(s: f64) -> String {
     if s < 10.0 {
@@ -117,6 +137,27 @@ mod tests {
         assert_eq!(seconds(245.0), "4:05");
         assert_eq!(clock(Duration::from_secs(7384)), "2:03:04");
         assert_eq!(clock(Duration::from_millis(59_600)), "1:00");
+    }
+
+    #[test]
+    fn figures_have_six_digits() {
+        let cases = [
+            (0.0, "0"),
+            (1.0, "1"),
+            (-2.5, "-2.5"),
+            (12.345678, "12.3457"),
+            (0.00123456789, "0.00123457"),
+            (99999.96, "100000"),
+            (123456.7, "123457"),
+            (1234567.0, "1.23457e6"),
+            (1.5e-5, "1.5e-5"),
+            (100.0, "100"),
+            (f64::INFINITY, "infinite"),
+            (f64::NAN, "none"),
+        ];
+        for (v, want) in cases {
+            assert_eq!(figure(v), want);
+        }
     }
 
     #[test]

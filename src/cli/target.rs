@@ -65,7 +65,8 @@ pub fn outputs(args: &RenderArgs, input: &Path) -> Result<Vec<Output>, Failure> 
     Ok(outputs)
 }
 
-fn output(path: PathBuf) -> Result<Output, Failure> {
+/// A file or stdout, with the format that its extension stands for.
+pub fn output(path: PathBuf) -> Result<Output, Failure> {
     let format = match Format::of(&path) {
         Some(format) => format,
         // A pipe or device has no use for an extension.
