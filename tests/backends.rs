@@ -10,8 +10,7 @@ use tison::geom::{
     Affine, Coherence, Cube, Cylinder, Hit, PacketBatch, Plain, Quad, Ray, RayHitPacket, RayPacket, ShapeSet, Sphere,
     TriangleMesh,
 };
-use tison::math::Frame;
-use tison::scene::{AnyShapes, Instance, Material, Mesh, MeshData, MeshPaint, Object, Scene, Shapes};
+use tison::scene::{AnyShapes, Instance, Mesh, Object, Scene, Shapes};
 use tison::with_shapes;
 
 /// What a scene is made of here: all that there is.
@@ -61,8 +60,7 @@ fn placement() -> impl Strategy<Value = DAffine3> + Clone {
 fn mesh(points: &[Vec3]) -> Mesh {
     let faces = (0..points.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     let triangles = Arc::new(TriangleMesh::new(points.iter().flat_map(|p| p.to_array()).collect(), faces));
-    let data = Arc::new(MeshData { triangles, normals: None, uvs: None, face_materials: None });
-    Mesh { data, paint: MeshPaint::One(0), mirrored: false }
+    Mesh::bare(triangles)
 }
 
 fn plain<S: tison::geom::Shape>(of: &[DAffine3], make: impl Fn(DVec3, f64) -> S) -> Arc<Plain<S>> {
@@ -99,7 +97,7 @@ fn objects(kind: Kind, at: &[DAffine3], own: &Mesh) -> Vec<Object> {
         Kind::Cylinders => AnyShapes::Cylinders(affine(at, cylinder)),
         Kind::Quads => AnyShapes::Quads(affine(at, quad)),
     };
-    vec![Object::Shapes(Shapes { materials: vec![0; set.len() as usize], set })]
+    vec![Object::Shapes(Shapes::bare(set))]
 }
 
 fn scene() -> impl Strategy<Value = Scene> {
@@ -110,16 +108,7 @@ fn scene() -> impl Strategy<Value = Scene> {
             let corners: Vec<_> = triangles.as_flattened().iter().map(|p| p.as_vec3()).collect();
             objects(kind, &at, &mesh(&corners))
         };
-        Scene {
-            frame: Frame::IDENTITY,
-            objects: parts.into_iter().flat_map(object).collect(),
-            materials: vec![Material::default()],
-            textures: vec![],
-            lights: vec![],
-            ambient: Vec3::ZERO,
-            background: Vec3::ZERO,
-            course_rules: false,
-        }
+        Scene::of(parts.into_iter().flat_map(object).collect())
     })
 }
 

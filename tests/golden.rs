@@ -11,8 +11,7 @@ use std::sync::atomic::AtomicBool;
 use tison::backend::{AnyBackend, BackendKind, BuildOptions};
 use tison::film::Film;
 use tison::math::colour::Srgb8;
-use tison::render::{self, Control, Crop, Job};
-use tison::scene::obj::Reader;
+use tison::render::{self, Control, Job};
 use tison::scene::{self, CameraDesc, CameraOverrides, LoadOptions, Loaded, View};
 
 /// How far a picture may be from the stored one.
@@ -84,15 +83,7 @@ const LARGE: &[&str] =
 
 fn load(file: &str) -> Loaded {
     let cancel = AtomicBool::new(false);
-    let options = LoadOptions {
-        reader: Reader::Own,
-        exact: false,
-        smooth: None,
-        allow: vec![],
-        overrides: vec![],
-        cancel: &cancel,
-        progress: None,
-    };
+    let options = LoadOptions::new(&cancel);
     let loaded = scene::load(&Path::new("scenes").join(file), &options).unwrap_or_else(|e| panic!("{e}"));
     assert!(loaded.diagnostics.is_empty() && loaded.warnings.is_empty(), "{file} has warnings: see tison check");
     loaded
@@ -104,17 +95,14 @@ fn job(loaded: &Loaded, width: u32, spp: u32) -> Job {
     let (w, h) = asked.size.unwrap_or((4, 3));
     let size = (width, (width * h).div_ceil(w));
     Job {
-        size,
-        crop: Crop { x0: 0, y0: 0, x1: size.0, y1: size.1 },
         spp,
         seed: asked.seed.unwrap_or(0),
         k_max: asked.recursion.unwrap_or(8),
         min_weight: asked.min_weight.unwrap_or(1.0 / 1024.0),
-        centre: false,
         lens_sampler: asked.lens_sampler.unwrap_or_default(),
         jitter_radius: asked.jitter_radius.unwrap_or(0.5),
         light_samples: if asked.course_rules { spp } else { 1 },
-        aovs: vec![],
+        ..Job::whole(size)
     }
 }
 

@@ -8,29 +8,16 @@ use tison::film::{Aov, Film};
 use tison::geom::TriangleMesh;
 use tison::math::Frame;
 use tison::render::{self, Control, Crop, Job, Outcome};
-use tison::scene::desc::LensSampler;
-use tison::scene::{
-    CameraDesc, CameraOverrides, Light, Material, Mesh, MeshData, MeshPaint, Object, Projection, Reflect, Scene, View,
-};
+use tison::scene::{CameraDesc, CameraOverrides, Light, Material, Mesh, Object, Projection, Reflect, Scene, View};
 
 fn object(points: &[[f32; 3]], faces: Vec<[u32; 3]>) -> Object {
     let triangles = Arc::new(TriangleMesh::new(points.concat(), faces));
-    let data = Arc::new(MeshData { triangles, normals: None, uvs: None, face_materials: None });
-    Object::Mesh(Mesh { data, paint: MeshPaint::One(0), mirrored: false })
+    Object::Mesh(Mesh::bare(triangles))
 }
 
 fn scene(objects: Vec<Object>, materials: Vec<Material>) -> Scene {
     let background = Vec3::new(0.1, 0.2, 0.3);
-    Scene {
-        frame: Frame::IDENTITY,
-        objects,
-        materials,
-        textures: vec![],
-        lights: vec![],
-        ambient: Vec3::ZERO,
-        background,
-        course_rules: false,
-    }
+    Scene { materials, background, ..Scene::of(objects) }
 }
 
 /// A square of side 2 in the plane z = 0 that faces +z, at height `z`.
@@ -71,19 +58,7 @@ fn camera(eye: DVec3) -> CameraDesc {
 }
 
 fn job(w: u32, h: u32) -> Job {
-    Job {
-        size: (w, h),
-        crop: Crop { x0: 0, y0: 0, x1: w, y1: h },
-        spp: 1,
-        seed: 0,
-        k_max: 8,
-        min_weight: 0.0,
-        centre: false,
-        lens_sampler: LensSampler::Concentric,
-        jitter_radius: 0.5,
-        light_samples: 1,
-        aovs: vec![],
-    }
+    Job::whole((w, h))
 }
 
 fn render(kind: BackendKind, scene: &Scene, camera: &CameraDesc, job: &Job) -> Outcome {

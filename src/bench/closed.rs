@@ -1,7 +1,7 @@
 //! Rays from inside closed meshes: each must hit.
 
-use super::random::Random;
 use crate::geom::{Ray, TriangleMesh};
+use crate::math::Random;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 

@@ -1,16 +1,16 @@
 //! What accuracy costs: our tests against textbook forms on the same rays, and what it takes to refine a hit.
 
-use super::random::Random;
 use super::setup;
 use super::textbook;
 use crate::backend::{BackendKind, Error};
 use crate::geom::triangle::{self, ShearedRay};
 use crate::geom::{self, Coherence, LANES, Lanes, PacketBatch, Ray, RayHitPacket, RayPacket, Shape};
+use crate::math::Random;
 use crate::render::block::{Block, Hits};
 use crate::render::facets::Facets;
 use crate::render::paint::Palette;
-use crate::scene::Object;
 use crate::scene::example::{self, Surface};
+use crate::scene::{Mesh, Object, Scene};
 use crate::simd::{self, Kernel};
 use glam::{DVec2, DVec3, Vec3};
 use std::hint::black_box;
@@ -250,7 +250,7 @@ fn refine_shape<S: Shape>(rounds: usize, rays: &[Ray], shape: &S) -> f64 {
 /// Triangles of a mesh as the renderer meets them, coherent: the bare formula, and what a block of sixteen takes
 /// with everything that belongs to it.
 fn triangles(rounds: usize) -> Result<Vec<RefineCost>, Error> {
-    let scene = setup::scene(vec![Object::Mesh(setup::mesh(example::mesh(20_480, Surface::Rock)))]);
+    let scene = Scene::of(vec![Object::Mesh(Mesh::bare(example::mesh(20_480, Surface::Rock)))]);
     let backend = setup::build(BackendKind::Native, &scene)?;
     let mut batch = PacketBatch::<RayHitPacket>::default();
     for i in 0..16_384 {

@@ -4,14 +4,12 @@
 //! shadow ray or a mirrored ray of the renderer meets is where it started from: a false self-hit. The scenes come
 //! from files with coordinates in f64, through the loader, and the rays from the renderer itself.
 
-use super::random::Random;
 use super::setup::build;
 use crate::backend::{self, Backend, BackendKind};
 use crate::geom::{Coherence, Hit, PacketBatch, Ray, RayHitPacket, RayPacket, TriangleMesh};
-use crate::render::{self, Control, Crop, Job};
-use crate::scene::desc::LensSampler;
+use crate::math::Random;
+use crate::render::{self, Control, Job};
 use crate::scene::example::{self, Surface};
-use crate::scene::obj::Reader;
 use crate::scene::{self, CameraDesc, Light, LoadOptions, Loaded, Material, Projection, Reflect};
 use glam::{DVec2, DVec3, Vec3};
 use std::fmt::Write;
@@ -175,19 +173,7 @@ pub fn leave(kind: BackendKind, body: Body, size: f64, place: Place, rays: u64) 
 /// A square picture at one sample per pixel that follows one bounce.
 #[must_use]
 pub fn job(side: u32) -> Job {
-    Job {
-        size: (side, side),
-        crop: Crop { x0: 0, y0: 0, x1: side, y1: side },
-        spp: 1,
-        seed: 0,
-        k_max: 1,
-        min_weight: 0.0,
-        centre: false,
-        lens_sampler: LensSampler::Concentric,
-        jitter_radius: 0.5,
-        light_samples: 1,
-        aovs: vec![],
-    }
+    Job { k_max: 1, ..Job::whole((side, side)) }
 }
 
 /// A pinhole camera at `eye` that looks at `target`.
@@ -237,15 +223,7 @@ fn loaded(body: Body, size: f64, place: Place) -> Result<(Loaded, DVec3), Error>
 /// As [`scene::load`].
 pub fn load(path: &Path) -> Result<Loaded, scene::Error> {
     let cancel = AtomicBool::new(false);
-    let options = LoadOptions {
-        reader: Reader::default(),
-        exact: false,
-        smooth: None,
-        allow: vec![],
-        overrides: vec![],
-        cancel: &cancel,
-        progress: None,
-    };
+    let options = LoadOptions::new(&cancel);
     scene::load(path, &options)
 }
 

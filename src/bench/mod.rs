@@ -20,7 +20,6 @@ pub mod closed;
 pub mod cost;
 pub mod leaving;
 pub mod plot;
-pub mod random;
 pub mod report;
 pub mod setup;
 pub mod speed;

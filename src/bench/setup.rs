@@ -2,33 +2,10 @@
 
 use crate::backend::{AnyBackend, BackendKind, BuildOptions, Error};
 use crate::geom::{Affine, Plain, Shape, TriangleMesh};
-use crate::math::Frame;
-use crate::scene::{AnyShapes, Material, Mesh, MeshData, MeshPaint, Object, Scene, Shapes};
+use crate::scene::Scene;
 use glam::{DAffine3, Vec3};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-
-/// A scene of these objects in one default material, unlit.
-#[must_use]
-pub fn scene(objects: Vec<Object>) -> Scene {
-    Scene {
-        frame: Frame::IDENTITY,
-        objects,
-        materials: vec![Material::default()],
-        textures: vec![],
-        lights: vec![],
-        ambient: Vec3::ZERO,
-        background: Vec3::ZERO,
-        course_rules: false,
-    }
-}
-
-/// A mesh without anything but triangles.
-#[must_use]
-pub fn mesh(triangles: impl Into<Arc<TriangleMesh>>) -> Mesh {
-    let data = MeshData { triangles: triangles.into(), normals: None, uvs: None, face_materials: None };
-    Mesh { data: Arc::new(data), paint: MeshPaint::One(0), mirrored: false }
-}
 
 /// Three points per triangle, nothing shared.
 #[must_use]
@@ -36,13 +13,6 @@ pub fn soup(triangles: &[[Vec3; 3]]) -> TriangleMesh {
     let points = triangles.as_flattened().iter().flat_map(|p| p.to_array()).collect();
     let faces = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     TriangleMesh::new(points, faces)
-}
-
-/// An object of these shapes.
-#[must_use]
-pub fn shapes(set: AnyShapes) -> Object {
-    let materials = vec![0; set.len() as usize];
-    Object::Shapes(Shapes { set, materials })
 }
 
 /// A set of shapes that need no transform.

@@ -3,14 +3,14 @@
 use super::cost::median;
 use super::leaving;
 use super::plot::{Line, Plot};
-use super::random::Random;
 use super::report::{Machine, Report, Section, Table};
 use super::setup::{self, plain};
 use crate::backend::{self, AnyBackend, Backend, BackendKind};
 use crate::geom::{Coherence, LANES, PacketBatch, Ray, RayHitPacket, RayPacket, Sphere};
-use crate::render::block::{Block, Path};
+use crate::math::Random;
+use crate::render::Surfaces;
 use crate::scene::example::{self, Surface};
-use crate::scene::{self, AnyShapes, CameraOverrides, Object, Scene, View};
+use crate::scene::{self, AnyShapes, CameraOverrides, Mesh, Object, Scene, Shapes, View};
 use glam::{DVec2, DVec3};
 use rayon::ThreadPool;
 use rayon::prelude::*;
@@ -70,7 +70,7 @@ pub fn run(options: &Options, tell: &dyn Fn(&str)) -> Result<Report, Error> {
     for &n in &options.triangles {
         let mesh = example::mesh(n, Surface::Rock);
         let name = format!("{} triangles", mesh.face_count());
-        measure(name, &setup::scene(vec![Object::Mesh(setup::mesh(mesh))]))?;
+        measure(name, &Scene::of(vec![Object::Mesh(Mesh::bare(mesh))]))?;
     }
     for &n in &options.spheres {
         measure(format!("{n} spheres"), &spheres(n))?;
@@ -108,7 +108,7 @@ fn spheres(n: u32) -> Scene {
     // So large that about half of the camera rays hit one.
     let radius = 1.27 / f64::from(n).sqrt();
     let balls = (0..n).map(|_| Sphere::new(random.point(), radius).expect("a size above 0"));
-    setup::scene(vec![setup::shapes(AnyShapes::Spheres(plain(balls)))])
+    Scene::of(vec![Object::Shapes(Shapes::bare(AnyShapes::Spheres(plain(balls))))])
 }
 
 fn measured(name: &str, scene: &Scene, threads: &[usize], rounds: usize) -> Result<Vec<Found>, Error> {
@@ -258,10 +258,12 @@ fn rays_from_hits(scene: &Scene, backend: &dyn Backend, camera: &[Ray]) -> (Vec<
     let (bounds, mut random) = (scene.local_bounds(), Random(11));
     let light = bounds.center() + bounds.size().length() * DVec3::new(0.6, 1.0, 0.9);
     let (mut shadow, mut bounced) = (Vec::new(), Vec::new());
+    let (mut surfaces, mut packet) = (Surfaces::new(scene), RayHitPacket::EMPTY);
     for ray in camera {
-        let Some(hit) = backend.intersect(ray) else { continue };
-        let block = Block::single(scene, ray, &hit, &Path::of_sample(0));
-        let (start, normal) = (Block::vec3(&block.front, 0), Block::dvec3(&block.ng, 0));
+        packet.ray.set(0, ray);
+        packet.set_hit(0, backend.intersect(ray).as_ref());
+        let Some(point) = surfaces.of(&packet, 1)[0] else { continue };
+        let (start, normal) = (point.origin_towards(point.ng), point.ng);
         let to_light = light - start.as_dvec3();
         if normal.dot(to_light) > 0.0 {
             shadow.push(Ray::segment(start, to_light.as_vec3(), 1.0));

@@ -8,8 +8,8 @@ use super::wrong::{self, Count, MARGIN, Setting, Shape};
 use super::{cost, setup};
 use crate::backend::{self, BackendKind};
 use crate::geom::{Ray, TriangleMesh};
-use crate::scene::Object;
 use crate::scene::example::{self, Surface};
+use crate::scene::{Mesh, Object, Scene};
 use glam::Vec3;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -218,7 +218,7 @@ type Tracer = Box<dyn Fn(&Ray) -> bool + Send + Sync>;
 
 /// Who traces a closed mesh.
 fn tracers(mesh: &Arc<TriangleMesh>) -> Result<Vec<(&'static str, Tracer)>, Error> {
-    let scene = setup::scene(vec![Object::Mesh(setup::mesh(Arc::clone(mesh)))]);
+    let scene = Scene::of(vec![Object::Mesh(Mesh::bare(Arc::clone(mesh)))]);
     let native = setup::build(BackendKind::Native, &scene)?;
     let native: Tracer = Box::new(move |ray| native.as_dyn().intersect(ray).is_some());
     Ok(std::iter::once(("native", native)).chain(embree_tracers(mesh)?).collect())

@@ -1,13 +1,13 @@
 //! Wrong answers about single shapes: hits that are missed or made up, and how far off `t` is, against exact numbers.
 
-use super::random::Random;
 use super::setup::{self, placed, plain, soup};
 use super::textbook;
 use super::truth::{Solid, truth};
 use crate::backend::{AnyBackend, BackendKind, Error};
 use crate::geom::{self, Ray, ShapeSet, triangle};
 use crate::math::Frame;
-use crate::scene::{AnyShapes, Object, Scene};
+use crate::math::Random;
+use crate::scene::{AnyShapes, Mesh, Object, Scene, Shapes};
 use crate::with_shapes;
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
@@ -150,20 +150,21 @@ impl Sizes {
         let frame = frame(f64::from(self.scale));
         let down = frame.local_per_world();
         let local = |v: Vec3| v.as_dvec3() * down;
+        let shapes = |set| Object::Shapes(Shapes::bare(set));
         let object = match shape {
-            Shape::Sphere => setup::shapes(AnyShapes::Spheres(plain([sphere(f64::from(self.scale) * down)]))),
-            Shape::Cube => setup::shapes(AnyShapes::Cubes(plain([cube(local(self.half))]))),
+            Shape::Sphere => shapes(AnyShapes::Spheres(plain([sphere(f64::from(self.scale) * down)]))),
+            Shape::Cube => shapes(AnyShapes::Cubes(plain([cube(local(self.half))]))),
             Shape::Cylinder => {
                 let set =
                     placed(cylinder(f64::from(self.scale) * down, f64::from(self.height) * down), DAffine3::IDENTITY);
-                setup::shapes(AnyShapes::Cylinders(set))
+                shapes(AnyShapes::Cylinders(set))
             }
             Shape::Triangle => {
                 let corners = self.corners.map(|p| local(p).as_vec3());
-                Object::Mesh(setup::mesh(soup(&[corners])))
+                Object::Mesh(Mesh::bare(soup(&[corners])))
             }
         };
-        Scene { frame, ..setup::scene(vec![object]) }
+        Scene { frame, ..Scene::of(vec![object]) }
     }
 }
 

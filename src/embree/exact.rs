@@ -4,13 +4,13 @@
 //! and only here is a ray sent, always with one. Neither can be mixed with the f32 kind.
 
 use super::fault::Fault;
-use super::query::{c_ray, intersect_args};
+use super::query::{c_query, intersect_args};
 use super::scene::Geometry;
-use super::user::{NOTHING, Packet, T_FAR, WITH_HITS, outward, unknown_width};
+use super::user::{NOTHING, Packet, T_FAR, WITH_HITS, outward, unknown_width, write_box};
 use super::{Device, Error, Scene, SceneBuilder, SceneOptions};
-use crate::geom::{Bounds, Coherence, Hit, Hit64, INVALID_ID, Ray, Ray64, ShapeSet, TriangleMesh};
+use crate::geom::{Bounds, Coherence, Hit, Hit64, Ray, Ray64, ShapeSet, TriangleMesh};
 use embree4_sys as sys;
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DVec3};
 use std::cell::Cell;
 use std::mem::MaybeUninit;
 use std::sync::Arc;
@@ -173,35 +173,11 @@ impl HitsAlong<'_> {
         self.context.nearest.set(None);
         let mut args = intersect_args(Coherence::Incoherent);
         args.context = (&raw mut self.context).cast();
-        let mut query = sys::RTCRayHit {
-            ray: c_ray(&self.ray),
-            hit: sys::RTCHit {
-                Ng_x: 0.0,
-                Ng_y: 0.0,
-                Ng_z: 0.0,
-                u: 0.0,
-                v: 0.0,
-                primID: INVALID_ID,
-                geomID: INVALID_ID,
-                instID: [INVALID_ID],
-                instPrimID: [INVALID_ID],
-            },
-        };
+        let mut query = c_query(&self.ray);
         // SAFETY: the scene is committed; `query` and `args` are ours alone and initialised, and the context in `args`
         // is the first field of a `Context` that lives on in `self`.
         unsafe { sys::rtcIntersect1(self.scene.raw(), &mut query, &mut args) };
-        let found = &query.hit;
-        (found.geomID != INVALID_ID).then(|| {
-            let hit = Hit {
-                t: query.ray.tfar,
-                u: found.u,
-                v: found.v,
-                ng: Vec3::ZERO,
-                prim_id: found.primID,
-                geom_id: found.geomID,
-            };
-            self.scene.placed.resolve(hit, found.instID[0])
-        })
+        self.scene.answer(&query)
     }
 }
 
@@ -231,19 +207,8 @@ unsafe extern "C" fn bounds<S: ShapeSet>(args: *const sys::RTCBoundsFunctionArgu
     // SAFETY: the `ExactSet<S>` given with this callback, kept by the scene until after its release.
     let set = unsafe { &*args.geometryUserPtr.cast::<ExactSet<S>>() };
     let padded = |b: Bounds| Bounds { lo: b.lo - set.pad, hi: b.hi + set.pad };
-    let [lo, hi] = set.fault.guard(NOTHING, || outward(padded(set.shapes.bounds(args.primID))));
-    let bounds = sys::RTCBounds {
-        lower_x: lo[0],
-        lower_y: lo[1],
-        lower_z: lo[2],
-        align0: 0.0,
-        upper_x: hi[0],
-        upper_y: hi[1],
-        upper_z: hi[2],
-        align1: 0.0,
-    };
-    // SAFETY: `bounds_o` is a place for one box, this call's alone.
-    unsafe { args.bounds_o.write(bounds) };
+    // SAFETY: Embree's arguments, as above.
+    unsafe { write_box(args, set.fault.guard(NOTHING, || outward(padded(set.shapes.bounds(args.primID))))) };
 }
 
 /// Keeps the hit of the exact ray with one shape, if it is the nearest.

@@ -109,23 +109,16 @@ impl Scene {
 
     #[inline]
     pub(super) fn intersect_plain(&self, ray: &Ray) -> Option<Hit> {
-        let mut query = sys::RTCRayHit {
-            ray: c_ray(ray),
-            hit: sys::RTCHit {
-                Ng_x: 0.0,
-                Ng_y: 0.0,
-                Ng_z: 0.0,
-                u: 0.0,
-                v: 0.0,
-                primID: INVALID_ID,
-                geomID: INVALID_ID,
-                instID: [INVALID_ID],
-                instPrimID: [INVALID_ID],
-            },
-        };
+        let mut query = c_query(ray);
         // SAFETY: the scene is committed; `query` is ours alone, initialised, and aligned by its type; no arguments
         // mean the defaults, among them incoherent.
         unsafe { sys::rtcIntersect1(self.raw(), &mut query, ptr::null_mut()) };
+        self.answer(&query)
+    }
+
+    /// What a query that Embree has answered says.
+    #[inline]
+    pub(super) fn answer(&self, query: &sys::RTCRayHit) -> Option<Hit> {
         let found = &query.hit;
         if found.geomID == INVALID_ID {
             return None;
@@ -267,8 +260,25 @@ fn part_of<const W: usize>(rays: &RayPacket, start: usize) -> RayPacket<W> {
     }
 }
 
+/// A question without an answer yet.
 #[inline]
-pub(super) fn c_ray(ray: &Ray) -> sys::RTCRay {
+pub(super) fn c_query(ray: &Ray) -> sys::RTCRayHit {
+    let hit = sys::RTCHit {
+        Ng_x: 0.0,
+        Ng_y: 0.0,
+        Ng_z: 0.0,
+        u: 0.0,
+        v: 0.0,
+        primID: INVALID_ID,
+        geomID: INVALID_ID,
+        instID: [INVALID_ID],
+        instPrimID: [INVALID_ID],
+    };
+    sys::RTCRayHit { ray: c_ray(ray), hit }
+}
+
+#[inline]
+fn c_ray(ray: &Ray) -> sys::RTCRay {
     sys::RTCRay {
         org_x: ray.o.x,
         org_y: ray.o.y,

@@ -64,7 +64,15 @@ pub(super) unsafe extern "C" fn bounds<S: PrimSet>(args: *const sys::RTCBoundsFu
     // SAFETY: the `UserSet<S>` given with this callback, kept by the scene until after its release. A shared
     // reference, never `ptr::read`: that would drop the set a second time.
     let set = unsafe { &*args.geometryUserPtr.cast::<UserSet<S>>() };
-    let [lo, hi] = set.fault.guard(NOTHING, || outward(set.prims.bounds(args.primID)));
+    // SAFETY: Embree's arguments, as above.
+    unsafe { write_box(args, set.fault.guard(NOTHING, || outward(set.prims.bounds(args.primID)))) };
+}
+
+/// Answers with a box, lower and upper corner.
+///
+/// # Safety
+/// `args` must be those of a bounds callback that has not answered yet.
+pub(super) unsafe fn write_box(args: &sys::RTCBoundsFunctionArguments, [lo, hi]: [[f32; 3]; 2]) {
     let bounds = sys::RTCBounds {
         lower_x: lo[0],
         lower_y: lo[1],
@@ -75,7 +83,7 @@ pub(super) unsafe extern "C" fn bounds<S: PrimSet>(args: *const sys::RTCBoundsFu
         upper_z: hi[2],
         align1: 0.0,
     };
-    // SAFETY: `bounds_o` is a place for one box, this call's alone.
+    // SAFETY: `bounds_o` is a place for one box, the callback's alone.
     unsafe { args.bounds_o.write(bounds) };
 }
 

@@ -4,8 +4,10 @@ pub mod colour;
 pub mod dd;
 mod frame;
 mod pow;
+mod random;
 mod sampling;
 
 pub use frame::Frame;
 pub use pow::pow01;
+pub use random::Random;
 pub use sampling::{Branch, PixelSamples, concentric_disc, polar_disc, rejection_disc, uniform_radius_disc};

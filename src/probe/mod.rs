@@ -75,7 +75,8 @@ pub struct Answer {
     pub ng: DVec3,
     /// Weights of a triangle's second and third corner; texture coordinates of a shape, v downwards.
     pub uv: DVec2,
-    /// Texture coordinates of a mesh that has them in memory, v upwards as in the file: only where an image samples them.
+    /// Texture coordinates of a mesh that keeps them (always with [`LoadOptions::exact`](crate::scene::LoadOptions::exact)), v
+    /// upwards as in the file.
     pub texcoord: Option<DVec2>,
     /// Index of the object in [`Scene::objects`].
     pub object: u32,

@@ -41,6 +41,26 @@ pub struct Job {
     pub aovs: Vec<Aov>,
 }
 
+impl Job {
+    /// All of an image of `size`, one sample a pixel, eight bounces deep and the whole tree.
+    #[must_use]
+    pub fn whole(size: (u32, u32)) -> Self {
+        Self {
+            size,
+            crop: Crop { x0: 0, y0: 0, x1: size.0, y1: size.1 },
+            spp: 1,
+            seed: 0,
+            k_max: 8,
+            min_weight: 0.0,
+            centre: false,
+            lens_sampler: LensSampler::default(),
+            jitter_radius: 0.5,
+            light_samples: 1,
+            aovs: Vec::new(),
+        }
+    }
+}
+
 /// Shared with whoever watches a render: progress out, cancellation in.
 #[derive(Debug, Default)]
 pub struct Control {

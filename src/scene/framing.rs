@@ -216,7 +216,7 @@ mod tests {
     use super::*;
     use crate::geom::TriangleMesh;
     use crate::math::Frame;
-    use crate::scene::{Material, Mesh, MeshData, MeshPaint, Object};
+    use crate::scene::{Mesh, Object};
     use std::sync::Arc;
 
     /// A crooked tetrahedron, and a vertex far off that no face uses.
@@ -224,16 +224,9 @@ mod tests {
         let points = vec![0.1, 0.0, 0.2, 1.0, 0.1, 0.0, 0.0, 0.5, 0.1, 0.3, 0.2, 0.9, 50.0, 50.0, 50.0];
         let faces = vec![[0, 1, 2], [0, 1, 3], [1, 2, 3], [0, 2, 3]];
         let triangles = Arc::new(TriangleMesh::new(points, faces));
-        let data = Arc::new(MeshData { triangles, normals: None, uvs: None, face_materials: None });
         Scene {
             frame: Frame { origin: DVec3::new(1000.0, -3.0, 7.0), exponent: 3 },
-            objects: vec![Object::Mesh(Mesh { data, paint: MeshPaint::One(0), mirrored: false })],
-            materials: vec![Material::default()],
-            lights: vec![],
-            ambient: Vec3::ZERO,
-            background: Vec3::ZERO,
-            textures: vec![],
-            course_rules: false,
+            ..Scene::of(vec![Object::Mesh(Mesh::bare(triangles))])
         }
     }
 

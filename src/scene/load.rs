@@ -31,6 +31,22 @@ pub struct LoadOptions<'a> {
     pub progress: Option<&'a (dyn Fn(u64, u64) + Sync)>,
 }
 
+impl<'a> LoadOptions<'a> {
+    /// The file as it is, by our own reader, for rendering.
+    #[must_use]
+    pub fn new(cancel: &'a AtomicBool) -> Self {
+        Self {
+            reader: Reader::default(),
+            smooth: None,
+            exact: false,
+            allow: Vec::new(),
+            overrides: Vec::new(),
+            cancel,
+            progress: None,
+        }
+    }
+}
+
 impl std::fmt::Debug for LoadOptions<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("LoadOptions").field("smooth", &self.smooth).field("allow", &self.allow).finish_non_exhaustive()

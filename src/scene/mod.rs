@@ -85,6 +85,21 @@ pub struct SceneCounts {
 }
 
 impl Scene {
+    /// `objects` as they are, of one default material, in the dark.
+    #[must_use]
+    pub fn of(objects: Vec<Object>) -> Self {
+        Self {
+            frame: Frame::IDENTITY,
+            objects,
+            materials: vec![Material::default()],
+            textures: Vec::new(),
+            lights: Vec::new(),
+            ambient: Vec3::ZERO,
+            background: Vec3::ZERO,
+            course_rules: false,
+        }
+    }
+
     /// Box around all that can be hit, in scene space.
     #[must_use]
     pub fn local_bounds(&self) -> Bounds {

@@ -143,6 +143,13 @@ impl Object {
 }
 
 impl Mesh {
+    /// Triangles and nothing else, of material 0.
+    #[must_use]
+    pub fn bare(triangles: impl Into<Arc<TriangleMesh>>) -> Self {
+        let data = MeshData { triangles: triangles.into(), normals: None, uvs: None, face_materials: None };
+        Self { data: Arc::new(data), paint: MeshPaint::One(0), mirrored: false }
+    }
+
     /// Index of the material of triangle `prim`.
     #[inline]
     #[must_use]
@@ -200,6 +207,14 @@ impl Instance {
     #[must_use]
     pub fn bounds(&self) -> Bounds {
         self.mesh.data.triangles.bounds().under(&self.to_scene)
+    }
+}
+
+impl Shapes {
+    /// The shapes of `set`, of material 0.
+    #[must_use]
+    pub fn bare(set: AnyShapes) -> Self {
+        Self { materials: vec![0; set.len() as usize], set }
     }
 }
 

@@ -1,9 +1,9 @@
 //! Rays aimed at what is hard to decide.
 
-use super::random::Random;
 use super::report::Group;
 use super::targets::{Outline, Targets};
 use crate::geom::{Bounds, Ray, ShapeSet, TriangleMesh};
+use crate::math::Random;
 use crate::scene::{AnyShapes, Object, Scene};
 use crate::with_shapes;
 use glam::{DAffine3, DVec3, Vec3};
@@ -103,9 +103,9 @@ impl<'a> Aim<'a> {
             _ => {
                 let p = corners(prim);
                 let at = match group {
-                    Group::Vertices => p[random.below(3) as usize],
+                    Group::Vertices => p[random.below(3)],
                     Group::Edges => {
-                        let i = random.below(3) as usize;
+                        let i = random.below(3);
                         p[i] + share(random) * (p[(i + 1) % 3] - p[i])
                     }
                     _ => {

@@ -116,12 +116,7 @@ impl<A: Backend, B: Backend> Judge<'_, A, B> {
                 (Some((a, _)), Some((b, _))) => a.t < b.t,
             };
             let Some((hit, facts)) = (if first_is_nearer { of_a } else { of_b }) else { break };
-            let class = match facts.side {
-                Side::In | Side::Out => return Verdict::real(facts.margin),
-                Side::Boundary => Class::Edge,
-                Side::EdgeOn => Class::Grazing,
-            };
-            let this = Verdict::new(class, facts.margin);
+            let Some(this) = excuse_for(&facts) else { return Verdict::real(facts.margin) };
             excuse = Some(excuse.map_or(this, |e| worse(e, this)));
             rest.t_near = behind(&rest, &hit);
             if first_is_nearer {
@@ -154,12 +149,7 @@ impl<A: Backend, B: Backend> Judge<'_, A, B> {
             let next = if of_first { self.first.intersect(&rest) } else { self.second.intersect(&rest) };
             let Some(hit) = next else { return excuse.unwrap_or(Verdict::real(0.0)) };
             let facts = self.facts(ray, &hit);
-            let class = match facts.side {
-                Side::In | Side::Out => return Verdict::real(facts.margin),
-                Side::Boundary => Class::Edge,
-                Side::EdgeOn => Class::Grazing,
-            };
-            let this = Verdict::new(class, facts.margin);
+            let Some(this) = excuse_for(&facts) else { return Verdict::real(facts.margin) };
             excuse = Some(excuse.map_or(this, |e| worse(e, this)));
             rest.t_near = behind(&rest, &hit);
         }
@@ -175,10 +165,8 @@ impl<A: Backend, B: Backend> Judge<'_, A, B> {
             let moved = Ray { d: turned.as_vec3(), ..*ray };
             let hits = [self.first.intersect(&moved), self.second.intersect(&moved)];
             for facts in hits.into_iter().flatten().map(|hit| self.facts(ray, &hit)) {
-                match facts.side {
-                    Side::Boundary => return Verdict::new(Class::Edge, facts.margin),
-                    Side::EdgeOn => return Verdict::new(Class::Grazing, facts.margin),
-                    Side::In | Side::Out => {}
+                if let Some(excuse) = excuse_for(&facts) {
+                    return excuse;
                 }
             }
         }
@@ -197,6 +185,15 @@ fn ids(hit: &Hit) -> (u32, u32) {
 /// Angle between unit vectors, if it is small.
 fn angle(a: DVec3, b: DVec3) -> f64 {
     (a - b).length()
+}
+
+/// Why a hit may be missed, if it may.
+fn excuse_for(facts: &Facts) -> Option<Verdict> {
+    match facts.side {
+        Side::In | Side::Out => None,
+        Side::Boundary => Some(Verdict::new(Class::Edge, facts.margin)),
+        Side::EdgeOn => Some(Verdict::new(Class::Grazing, facts.margin)),
+    }
 }
 
 /// What excuses a hit at `t`s that the primitive does not allow: nothing.

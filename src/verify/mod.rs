@@ -9,7 +9,6 @@
 mod aim;
 mod facts;
 mod judge;
-mod random;
 pub mod readers;
 mod report;
 mod targets;

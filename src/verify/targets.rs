@@ -1,7 +1,7 @@
 //! Which triangles, shapes and edges there are to aim at.
 
-use super::random::Random;
 use crate::geom::{BAD_FACE, TriangleMesh};
+use crate::math::Random;
 use crate::scene::{Object, Scene};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -20,7 +20,7 @@ pub(super) struct Outline {
 pub(super) struct Targets<'a> {
     scene: &'a Scene,
     /// Primitives up to and with each object.
-    up_to: Vec<u64>,
+    up_to: Vec<usize>,
     /// Edges of each object that is a mesh; those of the same mesh are shared.
     outlines: Vec<Option<Arc<Vec<Outline>>>>,
 }
@@ -32,9 +32,9 @@ impl<'a> Targets<'a> {
     pub(super) fn of(scene: &'a Scene, seed: u32) -> Self {
         let mut sum = 0;
         let count = |object: &Object| match object {
-            Object::Shapes(shapes) => u64::from(shapes.set.len()),
-            Object::Mesh(mesh) => mesh.data.triangles.face_count() as u64,
-            Object::Instance(instance) => instance.mesh.data.triangles.face_count() as u64,
+            Object::Shapes(shapes) => shapes.set.len() as usize,
+            Object::Mesh(mesh) => mesh.data.triangles.face_count(),
+            Object::Instance(instance) => instance.mesh.data.triangles.face_count(),
         };
         let up_to = scene.objects.iter().map(|object| {
             sum += count(object);
@@ -57,7 +57,7 @@ impl<'a> Targets<'a> {
         let total = *self.up_to.last().filter(|&&total| total > 0)?;
         (0..TRIES).find_map(|_| {
             let geom = if random.flip() {
-                random.below(self.up_to.len() as u64) as usize
+                random.below(self.up_to.len())
             } else {
                 let prim = random.below(total);
                 self.up_to.partition_point(|&end| end <= prim)
@@ -76,14 +76,14 @@ impl<'a> Targets<'a> {
     /// An edge of the mesh of object `geom`.
     pub(super) fn outline(&self, geom: u32, random: &mut Random) -> Option<Outline> {
         let all = self.outlines[geom as usize].as_ref().filter(|all| !all.is_empty())?;
-        Some(all[random.below(all.len() as u64) as usize])
+        Some(all[random.below(all.len())])
     }
 }
 
 /// The edges of a mesh, in order of their corners.
 fn outlines(mesh: &TriangleMesh, seed: u32) -> Vec<Outline> {
     let window = mesh.face_count().min(MOST_FACES);
-    let first = Random::of(seed, u32::MAX, 0).below((mesh.face_count() - window + 1) as u64) as usize;
+    let first = Random::of(seed, u32::MAX, 0).below(mesh.face_count() - window + 1);
     let faces = &mesh.faces()[first..first + window];
     let sides = |(i, face): (usize, &[u32; 3])| {
         let [a, b, c] = *face;

@@ -2,10 +2,10 @@
 
 use super::aim::Aim;
 use super::judge::{Judge, Verdict};
-use super::random::Random;
 use super::report::{Answer, Case, Group, Report};
 use crate::backend::Backend;
 use crate::geom::{Coherence, Hit, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
+use crate::math::Random;
 use crate::math::concentric_disc;
 use crate::render::{SurfacePoint, Surfaces, optics};
 use crate::scene::{Camera, Light, Scene};

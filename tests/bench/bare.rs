@@ -14,9 +14,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 use tison::backend::{AnyBackend, Backend, BackendKind, BuildOptions};
 use tison::geom::{Coherence, Hit, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
-use tison::render::{self, Control, Crop, Job};
-use tison::scene::desc::LensSampler;
-use tison::scene::obj::Reader;
+use tison::render::{self, Control, Job};
 use tison::scene::{self, CameraOverrides, LoadOptions, Projection, Scene, View};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -25,32 +23,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
     let model = args.model()?;
     let cancel = AtomicBool::new(false);
-    let options = LoadOptions {
-        reader: Reader::Own,
-        exact: false,
-        smooth: None,
-        allow: vec![],
-        overrides: vec![],
-        cancel: &cancel,
-        progress: None,
-    };
+    let options = LoadOptions::new(&cancel);
     let mut scene = scene::load(&model, &options)?.scene;
     let aspect = f64::from(args.size.0) / f64::from(args.size.1);
     let camera = scene.auto_camera(View::ThreeQuarter, &args.camera, aspect)?;
     scene.light_from(&camera);
-    let job = Job {
-        size: args.size,
-        crop: Crop { x0: 0, y0: 0, x1: args.size.0, y1: args.size.1 },
-        spp: 1,
-        seed: 0,
-        k_max: 0,
-        min_weight: 0.0,
-        centre: false,
-        lens_sampler: LensSampler::Concentric,
-        jitter_radius: 0.5,
-        light_samples: 1,
-        aovs: vec![],
-    };
+    let job = Job { k_max: 0, ..Job::whole(args.size) };
     let build = BuildOptions {
         threads,
         rays_expected: 3 * u64::from(args.size.0) * u64::from(args.size.1),

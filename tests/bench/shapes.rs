@@ -12,6 +12,7 @@ use glam::{DAffine3, DMat3, DMat4, DVec3, Vec3};
 use std::hint::black_box;
 use std::time::Instant;
 use tison::geom::{Affine, Cube, Cylinder, LANES, Lanes, Plain, Quad, Ray, RayPacket, Shape, ShapeSet, Sphere};
+use tison::math::Random;
 use tison::simd::{self, Kernel};
 
 const SHAPES: u32 = 64;
@@ -252,21 +253,4 @@ fn packets(random: &mut Random, spread: f64) -> Vec<RayPacket> {
         }
     }
     packets
-}
-
-struct Random(u64);
-
-impl Random {
-    /// In `[-1, 1)`; splitmix64.
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    fn point(&mut self) -> DVec3 {
-        DVec3::new(self.next(), self.next(), self.next())
-    }
 }

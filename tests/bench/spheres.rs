@@ -15,6 +15,7 @@ use tison::geom::{
     Affine, Coherence, Cube, Cylinder, Hit, LANES, PacketBatch, Plain, Ray, RayHitPacket, RayPacket, Shape, ShapeError,
     Sphere,
 };
+use tison::math::Random;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let args = Args::parse()?;
@@ -402,20 +403,3 @@ const OCCLUDED: sys::RTCOccludedArguments = sys::RTCOccludedArguments {
     filter: None,
     occluded: None,
 };
-
-struct Random(u64);
-
-impl Random {
-    /// In `[-1, 1)`; splitmix64.
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    fn point(&mut self) -> DVec3 {
-        DVec3::new(self.next(), self.next(), self.next())
-    }
-}

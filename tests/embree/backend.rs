@@ -7,21 +7,7 @@ use std::sync::{Arc, Mutex};
 use tison::backend::embree::EmbreeBackend;
 use tison::backend::{Backend, BuildOptions, Error};
 use tison::geom::{Affine, Coherence, Cube, Cylinder, PacketBatch, Plain, Quad, Ray, RayHitPacket, Sphere};
-use tison::math::Frame;
-use tison::scene::{AnyShapes, Instance, Material, Mesh, MeshData, MeshPaint, Object, Scene, Shapes};
-
-fn scene(objects: Vec<Object>) -> Scene {
-    Scene {
-        frame: Frame::IDENTITY,
-        objects,
-        materials: vec![Material::default()],
-        textures: vec![],
-        lights: vec![],
-        ambient: Vec3::ZERO,
-        background: Vec3::ZERO,
-        course_rules: false,
-    }
-}
+use tison::scene::{AnyShapes, Instance, Mesh, MeshData, MeshPaint, Object, Scene, Shapes};
 
 fn data(n: u32) -> Arc<MeshData> {
     Arc::new(MeshData { triangles: Arc::new(blob(n)), normals: None, uvs: None, face_materials: None })
@@ -60,7 +46,7 @@ fn one_of_each() -> Scene {
         spheres.push(Sphere::new(DVec3::new(9.0, 0.0, z), 0.5).unwrap());
         cubes.push(Cube::new(DVec3::new(12.0, 0.0, z), DVec3::splat(0.5)).unwrap());
     }
-    scene(vec![
+    Scene::of(vec![
         Object::Mesh(mesh(&own)),
         instance(&shared, at(3.0, 0.0)),
         instance(&shared, at(6.0, 0.0)),
@@ -103,7 +89,7 @@ fn an_objects_place_is_its_id() {
 
 #[test]
 fn a_mesh_with_many_instances_is_built_once() {
-    let build = |objects| EmbreeBackend::build(&scene(objects), &options(&AtomicBool::new(false))).unwrap();
+    let build = |objects| EmbreeBackend::build(&Scene::of(objects), &options(&AtomicBool::new(false))).unwrap();
     let shared = data(60);
     let place = |i: u32| at(f64::from(i % 10), f64::from(i / 10));
     let (one, many) =
@@ -126,7 +112,7 @@ fn few_rays_for_what_is_stored_get_a_quick_build() {
     });
     let mut objects: Vec<_> = (0..100).map(|i| instance(&shared, at(f64::from(i), 0.0))).collect();
     objects.push(shapes(AnyShapes::Spheres(Arc::new(balls))));
-    let scene = scene(objects);
+    let scene = Scene::of(objects);
     // 1520 triangles, stored once, and 500 spheres.
     for (rays_expected, quick) in [(20_199, true), (20_200, false)] {
         let options = BuildOptions { rays_expected, ..options(&cancel) };
@@ -140,7 +126,7 @@ fn few_rays_for_what_is_stored_get_a_quick_build() {
 
 #[test]
 fn the_progress_of_all_trees_is_one() {
-    let scene = scene(vec![
+    let scene = Scene::of(vec![
         instance(&data(70), at(0.0, 0.0)),
         instance(&data(90), at(2.0, 0.0)),
         Object::Mesh(mesh(&data(50))),
@@ -167,7 +153,7 @@ fn the_progress_of_all_trees_is_one() {
 #[test]
 fn a_transform_that_cannot_be_undone_is_an_error() {
     let flat = DAffine3::from_scale(DVec3::new(1.0, 1.0, 0.0));
-    let scene = scene(vec![Object::Mesh(mesh(&data(4))), instance(&data(4), flat)]);
+    let scene = Scene::of(vec![Object::Mesh(mesh(&data(4))), instance(&data(4), flat)]);
     let error = EmbreeBackend::build(&scene, &options(&AtomicBool::new(false))).unwrap_err();
     assert!(error.to_string().contains("cannot be undone"), "{error}");
 }

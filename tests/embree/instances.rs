@@ -167,7 +167,7 @@ fn many_instances_share_one_tree() {
     let (device, mesh) = (device(), Arc::new(blob(60)));
     let child = placed(&device, &mesh);
     let tree = device.memory_live();
-    let mut numbers = Numbers(3);
+    let mut numbers = Numbers::new(3);
     let mut builder = SceneBuilder::new(&device, SceneOptions::default()).unwrap();
     for id in 0..1000 {
         let to_scene = DAffine3::from_scale_rotation_translation(

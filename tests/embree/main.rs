@@ -13,6 +13,7 @@ use glam::Vec3;
 use std::sync::Arc;
 use tison::embree::{Device, DeviceConfig, PrimSet, Scene, SceneBuilder, SceneOptions};
 use tison::geom::{Bounds, Lanes, Ray, TriangleMesh};
+use tison::math::Random;
 
 fn device() -> Device {
     Device::new(&DeviceConfig { threads: 2, ..Default::default() }).unwrap()
@@ -56,15 +57,16 @@ fn blob(n: u32) -> TriangleMesh {
     TriangleMesh::new(points, faces.collect())
 }
 
-/// Numbers in [0, 1) that are the same on every run (splitmix64).
-struct Numbers(u64);
+/// Numbers in [0, 1) that are the same on every run.
+struct Numbers(Random);
 
 impl Numbers {
+    fn new(seed: u64) -> Self {
+        Self(Random(seed))
+    }
+
     fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 24) as f32
+        self.0.unit() as f32
     }
 
     /// Inside the cube from -1 to 1.
@@ -80,7 +82,7 @@ impl Numbers {
 }
 
 fn rays(n: usize) -> Vec<Ray> {
-    let mut numbers = Numbers(7);
+    let mut numbers = Numbers::new(7);
     (0..n).map(|_| numbers.ray()).collect()
 }
 

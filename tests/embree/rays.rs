@@ -138,7 +138,7 @@ fn quality_and_compactness_show_in_the_size_of_the_tree() {
 #[test]
 fn a_robust_scene_lets_no_ray_through_at_an_edge() {
     let (mesh, device) = (blob(40), device());
-    let mut numbers = Numbers(5);
+    let mut numbers = Numbers::new(5);
     let edge_rays: Vec<_> = (0..3000)
         .map(|i| {
             let [a, b, _] = mesh.triangle((i * 7919 % mesh.face_count()) as u32);
@@ -287,7 +287,7 @@ fn many_threads_may_ask_one_scene() {
 #[test]
 fn nothing_is_hit_outside_of_the_interval() {
     let scene = build(&device(), blob(24), SceneOptions::default());
-    let mut numbers = Numbers(3);
+    let mut numbers = Numbers::new(3);
     for ray in rays(200) {
         let Some(hit) = scene.intersect(&ray) else { continue };
         let t_far = hit.t * (0.1 + 0.8 * numbers.next());

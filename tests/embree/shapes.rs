@@ -18,7 +18,7 @@ fn scene<S: ShapeSet + 'static>(device: &Device, set: Arc<S>, quality: Quality) 
 const COUNT: u32 = 60;
 
 fn plain<S: Shape>(count: u32, make: impl Fn(DVec3, f64) -> S) -> Plain<S> {
-    let mut numbers = Numbers(11);
+    let mut numbers = Numbers::new(11);
     let mut set = Plain::default();
     for _ in 0..count {
         set.push(make(numbers.point().as_dvec3(), 0.05 + 0.3 * f64::from(numbers.next())));
@@ -28,7 +28,7 @@ fn plain<S: Shape>(count: u32, make: impl Fn(DVec3, f64) -> S) -> Plain<S> {
 
 /// Turned, stretched, sheared, and about half of them mirrored.
 fn placed<S: Shape>(shape: S) -> Affine<S> {
-    let mut numbers = Numbers(12);
+    let mut numbers = Numbers::new(12);
     let mut set = Affine::default();
     while ShapeSet::len(&set) < COUNT {
         let [x, y, z] = std::array::from_fn(|_| 0.3 * numbers.point().as_dvec3());
@@ -76,7 +76,7 @@ where
 
 fn check<S: ShapeSet + 'static>(what: &str, set: S) {
     let set = Arc::new(set);
-    let mut numbers = Numbers(23);
+    let mut numbers = Numbers::new(23);
     let limited = |(i, ray): (usize, Ray)| {
         let (near, far) = ([0.0, 0.4 * numbers.next()][i % 2], [f32::INFINITY, 2.0 * numbers.next()][i / 2 % 2]);
         Ray { t_near: near, t_far: far, ..ray }

@@ -1,8 +1,9 @@
 //! Refraction, total reflection, media in and beside each other, mirrors.
 
-use crate::kit::{Random, Told, build, job, load, looking, rays, render};
+use crate::kit::{Told, build, job, load, looking, rays, render};
 use glam::{DMat3, DVec3};
 use tison::backend::BackendKind;
+use tison::math::Random;
 use tison::render::Job;
 
 const WALLS: &str = "
@@ -105,8 +106,8 @@ fn blocks_of_one_glass_that_touch_are_one_block() {
     let mut random = Random(9);
     for &kind in BackendKind::COMPILED {
         for _ in 0..20 {
-            let eye = DVec3::new(-6.0, 0.2 * random.next(), 0.2 * random.next());
-            let d = DVec3::new(1.0, 0.05 * random.next(), 0.05 * random.next()).normalize();
+            let eye = DVec3::new(-6.0, 0.2 * random.signed(), 0.2 * random.signed());
+            let d = DVec3::new(1.0, 0.05 * random.signed(), 0.05 * random.signed()).normalize();
             let (a, b) = (end(kind, whole, eye, d), end(kind, halves, eye, d));
             assert!((a - b).length() < 1e-4, "{kind:?}: {a} and {b}");
         }

@@ -4,9 +4,7 @@ use glam::DVec3;
 use std::sync::atomic::AtomicBool;
 use tison::backend::{AnyBackend, BackendKind, BuildOptions};
 use tison::film::Aov;
-use tison::render::{self, Control, Crop, Job, Outcome};
-use tison::scene::desc::LensSampler;
-use tison::scene::obj::Reader;
+use tison::render::{self, Control, Job, Outcome};
 use tison::scene::{self, CameraDesc, LoadOptions, Loaded};
 
 pub fn load(toml: &str) -> Loaded {
@@ -14,15 +12,7 @@ pub fn load(toml: &str) -> Loaded {
     let path = dir.path().join("scene.toml");
     std::fs::write(&path, format!("tison = 1\n{toml}")).expect("a file in it");
     let cancel = AtomicBool::new(false);
-    let options = LoadOptions {
-        reader: Reader::Own,
-        exact: false,
-        smooth: None,
-        allow: vec![],
-        overrides: vec![],
-        cancel: &cancel,
-        progress: None,
-    };
+    let options = LoadOptions::new(&cancel);
     scene::load(&path, &options).unwrap_or_else(|e| panic!("{e}\n{toml}"))
 }
 
@@ -32,19 +22,7 @@ pub fn build(kind: BackendKind, loaded: &Loaded) -> AnyBackend {
 }
 
 pub fn job(w: u32, h: u32) -> Job {
-    Job {
-        size: (w, h),
-        crop: Crop { x0: 0, y0: 0, x1: w, y1: h },
-        spp: 1,
-        seed: 0,
-        k_max: 8,
-        min_weight: 0.0,
-        centre: false,
-        lens_sampler: LensSampler::Concentric,
-        jitter_radius: 0.5,
-        light_samples: 1,
-        aovs: vec![],
-    }
+    Job::whole((w, h))
 }
 
 /// The scene's first camera renders it.
@@ -93,28 +71,5 @@ pub fn looking(eye: DVec3, d: DVec3) -> CameraDesc {
         focus: None,
         aspect: None,
         clip: None,
-    }
-}
-
-/// Uniform numbers; splitmix64.
-pub struct Random(pub u64);
-
-impl Random {
-    /// In `[-1, 1)`.
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    pub fn direction(&mut self) -> DVec3 {
-        loop {
-            let v = DVec3::new(self.next(), self.next(), self.next());
-            if (0.1..1.0).contains(&v.length()) {
-                return v.normalize();
-            }
-        }
     }
 }

@@ -67,7 +67,7 @@ fn a_ray_that_leaves_a_solid_does_not_meet_it_again() {
             for s in convex {
                 let mut left = 0;
                 for _ in 0..8000 {
-                    let r = random.towards(&s, 3.0);
+                    let r = towards(&mut random, &s, 3.0);
                     let Some(t) = s.set.hit(&r) else { continue };
                     left += 1;
                     let p = s.set.refine(&r, t);

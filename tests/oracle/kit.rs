@@ -3,6 +3,7 @@ use super::truth::{Solid, truth};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use std::sync::Arc;
 use tison::geom::{Affine, Cube, Cylinder, Lanes, Plain, Quad, Shape, ShapePoint, ShapeSet, Sphere};
+pub use tison::math::Random;
 use tison::simd::{self, Kernel, Level};
 
 /// One primitive, as the library and as the oracle have it.
@@ -192,42 +193,10 @@ pub fn lanes_at_all_levels<S: Shape, const N: usize>(shape: &S, rays: &[Ray64; N
     base.map_or([f64::INFINITY.to_bits(); N], |t| t.map(f64::to_bits))
 }
 
-/// Splitmix64.
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// In `[0, 1)`.
-    pub fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// In the cube from -1 to 1.
-    pub fn point(&mut self) -> DVec3 {
-        DVec3::from_array(std::array::from_fn(|_| 2.0 * self.unit() - 1.0))
-    }
-
-    pub fn direction(&mut self) -> DVec3 {
-        loop {
-            let p = self.point();
-            if p.length_squared() > 1e-3 && p.length_squared() < 1.0 {
-                return p.normalize();
-            }
-        }
-    }
-
-    /// A ray from `distance` away, aimed at the shape's surroundings.
-    pub fn towards(&mut self, s: &Specimen, distance: f64) -> Ray64 {
-        let local = distance * self.direction();
-        let o = s.to_world.transform_point3(local);
-        let target = s.to_world.transform_point3(1.3 * self.point());
-        ray(o, target - o)
-    }
+/// A ray from `distance` away, aimed at the shape's surroundings.
+pub fn towards(random: &mut Random, s: &Specimen, distance: f64) -> Ray64 {
+    let local = distance * random.direction();
+    let o = s.to_world.transform_point3(local);
+    let target = s.to_world.transform_point3(1.3 * random.point());
+    ray(o, target - o)
 }

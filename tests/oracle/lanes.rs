@@ -66,7 +66,7 @@ fn wide_is_single_in_sets_and_from_f32() {
     for (what, to_world) in transforms() {
         for s in all_under(what, to_world) {
             for _ in 0..100 {
-                let rays: [Ray64; 16] = std::array::from_fn(|_| random.towards(&s, 3.0));
+                let rays: [Ray64; 16] = std::array::from_fn(|_| towards(&mut random, &s, 3.0));
                 let wide = s.set.lanes(&rays).unwrap_or([f64::INFINITY; 16]);
                 let single = rays.map(|r| s.set.hit(&r).unwrap_or(f64::INFINITY));
                 assert_eq!(wide.map(f64::to_bits), single.map(f64::to_bits), "{}", s.name);
@@ -94,7 +94,7 @@ fn nan_is_a_miss() {
     for s in all_plain().into_iter().chain(all_under("turned", transforms()[0].1)) {
         let mut tried = 0;
         for _ in 0..400 {
-            let r = random.towards(&s, 3.0);
+            let r = towards(&mut random, &s, 3.0);
             if s.set.hit(&r).is_none() {
                 continue;
             }

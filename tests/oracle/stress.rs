@@ -15,7 +15,7 @@ fn from_near_and_far() {
             // At 1e7 the normal of a grazing hit is only as good as the ray's own coordinates.
             let limits = if k < 7 { STRICT } else { Limits { radians: 2e-5, ..STRICT } };
             for _ in 0..10_000 {
-                match check(&s, &random.towards(&s, distance), &limits) {
+                match check(&s, &towards(&mut random, &s, distance), &limits) {
                     Some(true) => hits += 1,
                     Some(false) => misses += 1,
                     None => {}
@@ -69,7 +69,7 @@ fn the_length_of_the_direction_does_not_matter() {
     let mut random = Random(3);
     for s in all_plain().into_iter().chain(all_under("turned", transforms()[0].1)) {
         for _ in 0..300 {
-            let r = random.towards(&s, 3.0);
+            let r = towards(&mut random, &s, 3.0);
             let unit = Ray64 { d: r.d.normalize(), ..r };
             let want = s.set.hit(&unit);
             for length in [1e-25, 1e-10, 1e10, 1e20] {
@@ -201,7 +201,7 @@ fn under_every_transform() {
             let mut hits = 0;
             for _ in 0..4000 {
                 let distance = 0.3 + 6.0 * random.unit();
-                hits += u32::from(check(&s, &random.towards(&s, distance), &STRICT) == Some(true));
+                hits += u32::from(check(&s, &towards(&mut random, &s, distance), &STRICT) == Some(true));
             }
             assert!(hits > 400, "{}: {hits}", s.name);
         }

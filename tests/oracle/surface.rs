@@ -39,7 +39,7 @@ fn refined_points_lie_on_the_surface_and_in_tight_bounds() {
         let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let mut hits = 0;
         for i in 0..20_000 {
-            let r = random.towards(&s, 1.2 + 3.0 * f64::from(i % 7));
+            let r = towards(&mut random, &s, 1.2 + 3.0 * f64::from(i % 7));
             let Some(t) = s.set.hit(&r) else { continue };
             hits += 1;
             let p = s.set.refine(&r, t);
@@ -123,7 +123,7 @@ fn a_reported_hit_stays_one() {
         let mut tried = 0;
         for _ in 0..1000 {
             // Rays that pass by; a backend that saw a slightly different one says they hit.
-            let r = random.towards(&s, 3.0);
+            let r = towards(&mut random, &s, 3.0);
             if s.set.hit(&r).is_some() {
                 continue;
             }

@@ -1,12 +1,12 @@
 //! Scenes of meshes, placed and not, against a loop over all triangles in f64.
 use super::kit::*;
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3};
 use std::sync::Arc;
 use tison::backend::BackendKind;
 use tison::geom::{Plain, Sphere, TriangleMesh};
 use tison::math::Frame;
 use tison::probe::ProbeRay;
-use tison::scene::{AnyShapes, Instance, Material, Mesh, MeshData, MeshPaint, Object, Scene, Shapes, smooth};
+use tison::scene::{AnyShapes, Instance, Mesh, MeshData, MeshPaint, Object, Scene, Shapes, smooth};
 
 /// A closed bumpy ball of radius about 1 with `4 n (n - 1)` triangles, wound outwards.
 fn blob(n: u32) -> TriangleMesh {
@@ -38,16 +38,7 @@ fn mesh(triangles: TriangleMesh, normals: bool, mirrored: bool) -> Mesh {
 }
 
 fn scene(objects: Vec<Object>, frame: Frame) -> Scene {
-    Scene {
-        frame,
-        objects,
-        materials: vec![Material::default()],
-        textures: vec![],
-        lights: vec![],
-        ambient: Vec3::ZERO,
-        background: Vec3::ZERO,
-        course_rules: false,
-    }
+    Scene { frame, ..Scene::of(objects) }
 }
 
 /// What the objects are in the world, in f64: of each triangle object, number, corners and whether it is mirrored.

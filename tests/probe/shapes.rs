@@ -11,7 +11,7 @@ fn under_every_transform() {
             let mut hits = 0;
             for _ in 0..1000 {
                 let distance = 0.3 + 6.0 * random.unit();
-                hits += u32::from(check(&s, &random.towards(&s, distance), &PROMISED) == Some(true));
+                hits += u32::from(check(&s, &towards(&mut random, &s, distance), &PROMISED) == Some(true));
             }
             assert!(hits > 100, "{}: {hits}", s.name);
         }
@@ -29,7 +29,7 @@ fn far_better_than_promised() {
         let limits = if fewer { Limits { t: 1e-9, ..limits } } else { limits };
         for s in all_under(what, to_world) {
             for _ in 0..500 {
-                check(&s, &random.towards(&s, 3.0), &limits);
+                check(&s, &towards(&mut random, &s, 3.0), &limits);
             }
         }
     }
@@ -45,7 +45,7 @@ fn from_near_and_far() {
             for _ in 0..800 {
                 // Beyond 1e7 the ray's own digits decide less and less.
                 let margin = 1e-6f64.max(1e-13 * distance);
-                match check(&s, &random.towards(&s, distance), &Limits { margin, ..PROMISED }) {
+                match check(&s, &towards(&mut random, &s, distance), &Limits { margin, ..PROMISED }) {
                     Some(true) => hits += 1,
                     Some(false) => misses += 1,
                     None => {}
@@ -62,7 +62,7 @@ fn the_length_of_the_direction_does_not_matter() {
     for (what, to_world) in [transforms()[0], transforms()[5], transforms()[9], transforms()[10]] {
         for s in all_under(what, to_world) {
             for _ in 0..100 {
-                let r = random.towards(&s, 3.0);
+                let r = towards(&mut random, &s, 3.0);
                 for exponent in [-25, -10, 10, 20, 25] {
                     check(&s, &ProbeRay { d: r.d * 10f64.powi(exponent), ..r }, &PROMISED);
                 }
@@ -83,7 +83,7 @@ fn intervals_are_open_to_the_last_bit() {
     for (what, to_world) in transforms() {
         for s in all_under(what, to_world) {
             for i in 0..100 {
-                let r = random.towards(&s, [3.0, 1e5][i % 2]);
+                let r = towards(&mut random, &s, [3.0, 1e5][i % 2]);
                 for (kind, prober) in &s.probers {
                     let place = format!("{} by {}: {r:?}", s.name, kind.name());
                     let Some(hit) = prober.probe(&r) else { continue };

@@ -7,8 +7,8 @@ use tison::backend::{AnyBackend, BackendKind};
 use tison::bench::closed::{Aim, leaks, room};
 use tison::bench::setup;
 use tison::geom::{Coherence, PacketBatch, Ray, RayHitPacket, RayPacket, TriangleMesh};
-use tison::scene::Object;
 use tison::scene::example::{self, Surface};
+use tison::scene::{Mesh, Object, Scene};
 
 const INSIDE: (Vec3, f32) = (Vec3::ZERO, 0.3);
 
@@ -21,7 +21,7 @@ fn meshes() -> [(&'static str, Arc<TriangleMesh>); 3] {
 }
 
 fn built(kind: BackendKind, mesh: &Arc<TriangleMesh>) -> AnyBackend {
-    let scene = setup::scene(vec![Object::Mesh(setup::mesh(Arc::clone(mesh)))]);
+    let scene = Scene::of(vec![Object::Mesh(Mesh::bare(Arc::clone(mesh)))]);
     setup::build(kind, &scene).expect("a good scene")
 }
 

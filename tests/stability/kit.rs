@@ -2,11 +2,11 @@
 
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 use tison::backend::{AnyBackend, BackendKind};
-use tison::bench::random::Random;
 use tison::bench::setup::{self, placed, plain};
 use tison::bench::truth::{Solid, truth};
 use tison::geom::{Cube, Cylinder, Quad, Ray, ShapePoint, ShapeSet, Sphere};
-use tison::scene::{AnyShapes, Object, Scene};
+use tison::math::Random;
+use tison::scene::{AnyShapes, Object, Scene, Shapes};
 use tison::with_shapes;
 
 /// A test once per backend: `name::native` and `name::embree`.
@@ -44,7 +44,7 @@ pub struct Specimen {
 
 impl Specimen {
     pub fn new(kind: BackendKind, name: &str, solid: Solid, to_world: DAffine3, set: AnyShapes) -> Self {
-        let scene = setup::scene(vec![setup::shapes(set)]);
+        let scene = Scene::of(vec![Object::Shapes(Shapes::bare(set))]);
         let backend = setup::build(kind, &scene).expect("a good scene");
         Self { name: format!("{name}, {kind:?}"), solid, to_world, scene, backend }
     }

@@ -4,11 +4,11 @@ use crate::for_each_backend;
 use crate::kit::*;
 use glam::{DAffine3, DVec3, Vec3};
 use tison::backend::BackendKind;
-use tison::bench::random::Random;
 use tison::bench::setup::{self, plain};
 use tison::bench::truth::Solid;
 use tison::geom::{Ray, ShapePoint, Sphere};
-use tison::scene::{AnyShapes, Object};
+use tison::math::Random;
+use tison::scene::{AnyShapes, Mesh, Object, Scene};
 
 for_each_backend! {
     fn every_shape_from_near_and_far(kind: BackendKind) {
@@ -90,7 +90,7 @@ for_each_backend! {
 
     fn the_length_of_the_direction_at_a_mesh(kind: BackendKind) {
         let mesh = tison::scene::example::mesh(2_000, tison::scene::example::Surface::Rock);
-        let scene = setup::scene(vec![Object::Mesh(setup::mesh(mesh))]);
+        let scene = Scene::of(vec![Object::Mesh(Mesh::bare(mesh))]);
         let backend = setup::build(kind, &scene).expect("a good scene");
         let mut random = Random(4);
         for _ in 0..1000 {

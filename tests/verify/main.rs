@@ -12,7 +12,6 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use tison::backend::native::{BuildOptions, Native, Quality};
-use tison::scene::obj::Reader;
 use tison::scene::{self, CameraDesc, CameraOverrides, LoadOptions, Scene, View};
 use tison::verify::Options;
 
@@ -20,15 +19,7 @@ static GO_ON: AtomicBool = AtomicBool::new(false);
 
 /// A scene of the project, and what looks at it.
 fn load(path: &Path) -> (Scene, CameraDesc) {
-    let options = LoadOptions {
-        reader: Reader::Own,
-        exact: false,
-        smooth: None,
-        allow: vec![],
-        overrides: vec![],
-        cancel: &GO_ON,
-        progress: None,
-    };
+    let options = LoadOptions::new(&GO_ON);
     let mut loaded = scene::load(path, &options).unwrap_or_else(|e| panic!("{e}"));
     let framed =
         || loaded.scene.auto_camera(View::default(), &CameraOverrides::default(), 1.5).expect("there is a view");

@@ -2,12 +2,9 @@
 
 use super::*;
 use crate::cli::plan::tests::{plan, plan_ok};
-use glam::Vec3;
-use std::sync::Arc;
 use tison::geom::TriangleMesh;
-use tison::math::Frame;
 use tison::scene::desc::RenderDesc;
-use tison::scene::{Material, Mesh, MeshData, MeshPaint, Object, Scene, Unused};
+use tison::scene::{Mesh, Object, Scene, Unused};
 
 const MAIN: CameraDesc = CameraDesc {
     eye: DVec3::new(0.0, 2.0, 8.0),
@@ -32,17 +29,7 @@ const FLAT: CameraDesc = CameraDesc {
 /// One triangle, seen by `cameras`, for an image of 640x512.
 fn loaded(cameras: &[(&str, CameraDesc)]) -> Loaded {
     let triangles = TriangleMesh::new(vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0], vec![[0, 1, 2]]);
-    let data = MeshData { triangles: Arc::new(triangles), normals: None, uvs: None, face_materials: None };
-    let scene = Scene {
-        frame: Frame { origin: DVec3::ZERO, exponent: 0 },
-        objects: vec![Object::Mesh(Mesh { data: Arc::new(data), paint: MeshPaint::One(0), mirrored: false })],
-        materials: vec![Material::default()],
-        textures: vec![],
-        lights: vec![],
-        ambient: Vec3::ZERO,
-        background: Vec3::ZERO,
-        course_rules: false,
-    };
+    let scene = Scene::of(vec![Object::Mesh(Mesh::bare(triangles))]);
     let cameras = cameras.iter().map(|&(name, camera)| NamedCamera { name: name.into(), camera }).collect();
     let render = RenderDesc { size: Some((640, 512)), ..RenderDesc::default() };
     Loaded {

@@ -4,8 +4,8 @@ use super::place;
 use super::shapes::{OneShape, Sets};
 use crate::geom::{ShapeError, invert};
 use crate::math::Frame;
-use crate::scene::{Material, Object, Scene};
-use glam::{DAffine3, Vec3};
+use crate::scene::{Object, Scene};
+use glam::DAffine3;
 
 impl Scene {
     /// `shape` as `to_world` places it, in a frame of its own: of the default material, without light.
@@ -23,15 +23,6 @@ impl Scene {
         let frame = Frame::around(&[thing], (bounds.lo, bounds.hi));
         let mut sets = Sets::default();
         let class = sets.add(shape, &place::to_scene(&frame, to_world), 0)?;
-        Ok(Self {
-            frame,
-            objects: vec![Object::Shapes(sets.take(class))],
-            materials: vec![Material::default()],
-            textures: Vec::new(),
-            lights: Vec::new(),
-            ambient: Vec3::ZERO,
-            background: Vec3::ZERO,
-            course_rules: false,
-        })
+        Ok(Self { frame, ..Self::of(vec![Object::Shapes(sets.take(class))]) })
     }
 }
