@@ -10,6 +10,7 @@ use glam::DVec3;
 use std::ffi::OsString;
 use std::path::PathBuf;
 use tison::film::{Aov, Tonemap};
+use tison::math::Sampler;
 use tison::scene::desc::LensSampler;
 use tison::scene::obj::Reader;
 
@@ -276,6 +277,10 @@ pub struct PictureArgs {
         allow_negative_numbers = true, help_heading = "Quality"
     )]
     pub light_samples: Option<u32>,
+    /// How samples are drawn: sobol spreads pixel, lens and lights together; random takes each by chance; stratified
+    /// takes one from each of as many cells [default: sobol]
+    #[arg(long, value_name = "NAME", value_parser = sampler(), help_heading = "Quality")]
+    pub sampler: Option<Sampler>,
     /// How points of the lens are drawn; polar-uniform-radius is the biased sampler of the 2011 report, which
     /// takes too many in the middle [default: concentric]
     #[arg(long, value_name = "NAME", value_parser = lens_sampler(), help_heading = "Quality")]
@@ -370,6 +375,11 @@ fn tonemap() -> impl TypedValueParser<Value = Tonemap> {
 fn obj_reader() -> impl TypedValueParser<Value = Reader> {
     PossibleValuesParser::new(Reader::ALL.map(Reader::name))
         .map(|name| Reader::ALL.into_iter().find(|r| r.name() == name).expect("only their names are possible"))
+}
+
+fn sampler() -> impl TypedValueParser<Value = Sampler> {
+    PossibleValuesParser::new(Sampler::ALL.map(Sampler::name))
+        .map(|name| Sampler::ALL.into_iter().find(|s| s.name() == name).expect("only their names are possible"))
 }
 
 fn lens_sampler() -> impl TypedValueParser<Value = LensSampler> {

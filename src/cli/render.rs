@@ -19,6 +19,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use tison::backend::{self, AnyBackend, BackendKind, BuildOptions};
 use tison::film::{self, Display, Film, Notes, Tonemap};
+use tison::math::Sampler;
 use tison::metrics::Difference;
 use tison::render::{self, Control, Job, Outcome, RenderStats};
 use tison::scene::format::Override;
@@ -387,11 +388,15 @@ fn notes(plan: &Plan, settings: &Settings, backend: &AnyBackend) -> Notes {
         0.0 => String::new(),
         ev => format!(", exposure {ev}"),
     };
+    let sampler = match job.sampler {
+        Sampler::Sobol => String::new(),
+        other => format!(", sampler {}", other.name()),
+    };
     Notes {
         software: format!("tison {}", *VERSION),
         title: name.to_string_lossy().into_owned(),
         comment: format!(
-            "{}x{}, spp {}, seed {}, backend {backend}{curve}{exposure}",
+            "{}x{}, spp {}, seed {}, backend {backend}{sampler}{curve}{exposure}",
             job.size.0, job.size.1, job.spp, job.seed
         ),
     }

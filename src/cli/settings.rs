@@ -6,6 +6,7 @@ use super::frame::Frame;
 use super::plan::{Input, Plan};
 use std::fmt;
 use tison::film::{Display, Tonemap};
+use tison::math::Sampler;
 use tison::render::Job;
 use tison::scene::desc::{LensSampler, RenderDesc};
 
@@ -85,7 +86,11 @@ impl Settings {
         let course = render.course_rules;
         let light_samples = render.samples.filter(|_| course);
         let light_samples = all.choose("light-samples", "render.samples", flags.light_samples, light_samples, 1);
-        let lens_sampler = all.lens_sampler(flags, render);
+        let sampler = (flags.sampler, render.sampler);
+        let sampler = all.by_name("sampler", "render.sampler", sampler, Sampler::default(), Sampler::name);
+        let lens_sampler = (flags.lens_sampler, render.lens_sampler);
+        let lens_sampler =
+            all.by_name("lens-sampler", "render.lens_sampler", lens_sampler, LensSampler::default(), LensSampler::name);
         let tonemap = all.tonemap(flags, course);
         let exposure = all.choose("exposure", "", flags.exposure, None, 0.0);
         all.switch("centre", flags.centre);
@@ -97,6 +102,7 @@ impl Settings {
             k_max,
             min_weight,
             centre: flags.centre,
+            sampler,
             lens_sampler,
             jitter_radius,
             light_samples,
@@ -159,31 +165,23 @@ impl Choices<'_> {
         value
     }
 
-    fn lens_sampler(&mut self, flags: &PictureArgs, render: &RenderDesc) -> LensSampler {
-        let (flag, scene) = (flags.lens_sampler, render.lens_sampler);
-        let text = LensSampler::name;
-        self.choose(
-            "lens-sampler",
-            "render.lens_sampler",
-            flag.map(text),
-            scene.map(text),
-            text(LensSampler::default()),
-        );
-        flag.or(scene).unwrap_or_default()
+    /// A choice that is shown by its name; `said` is what the flag and the scene say.
+    fn by_name<T: Copy>(
+        &mut self,
+        name: &'static str,
+        key: &str,
+        said: (Option<T>, Option<T>),
+        default: T,
+        text: fn(T) -> &'static str,
+    ) -> T {
+        self.choose(name, key, said.0.map(text), said.1.map(text), text(default));
+        said.0.or(said.1).unwrap_or(default)
     }
 
     /// Course scenes are shown as the course's program shows them.
     fn tonemap(&mut self, flags: &PictureArgs, course: bool) -> Tonemap {
-        let scene = course.then_some(Tonemap::Stretch);
-        let text = Tonemap::name;
-        self.choose(
-            "tonemap",
-            "render.course_rules",
-            flags.tonemap.map(text),
-            scene.map(text),
-            text(Tonemap::default()),
-        );
-        flags.tonemap.or(scene).unwrap_or_default()
+        let said = (flags.tonemap, course.then_some(Tonemap::Stretch));
+        self.by_name("tonemap", "render.course_rules", said, Tonemap::default(), Tonemap::name)
     }
 
     fn switch(&mut self, name: &'static str, given: bool) {

@@ -1,6 +1,7 @@
 //! What is to be rendered, how a run is watched and stopped, and what it tells afterwards.
 
 use crate::film::{Aov, Film};
+use crate::math::{Sampler, Sampling};
 use crate::scene::desc::LensSampler;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
@@ -31,6 +32,8 @@ pub struct Job {
     pub min_weight: f32,
     /// One sample a pixel goes through the exact centre, not through a point beside it.
     pub centre: bool,
+    /// How samples are drawn.
+    pub sampler: Sampler,
     /// How points of the lens are drawn.
     pub lens_sampler: LensSampler,
     /// Camera rays pass within this many pixels of their pixel's centre, across and down; 0.5 is the whole pixel.
@@ -53,11 +56,18 @@ impl Job {
             k_max: 8,
             min_weight: 0.0,
             centre: false,
+            sampler: Sampler::default(),
             lens_sampler: LensSampler::default(),
             jitter_radius: 0.5,
             light_samples: 1,
             aovs: Vec::new(),
         }
+    }
+
+    /// Where its samples lie.
+    #[must_use]
+    pub fn sampling(&self) -> Sampling {
+        Sampling::new(self.sampler, self.seed, self.spp, self.light_samples.max(1))
     }
 }
 

@@ -215,7 +215,7 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
                 return false;
             }
             let before = self.waves.tally.rays.total();
-            segment.camera_rays(camera, job, &mut self.batch);
+            segment.camera_rays(camera, job, &self.waves.sampling, &mut self.batch);
             self.waves.trace(&mut self.batch, &segment, Coherence::Coherent);
             self.add_up(first_pixel, &segment);
             if segment.first + segment.samples == job.spp {

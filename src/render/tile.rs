@@ -2,7 +2,7 @@
 
 use super::job::{Crop, Job};
 use crate::geom::{LANES, PacketBatch, RayHitPacket};
-use crate::math::{PixelSamples, concentric_disc, polar_disc, rejection_disc, uniform_radius_disc};
+use crate::math::{PixelSamples, Sampling, concentric_disc, polar_disc, rejection_disc, uniform_radius_disc};
 use crate::scene::desc::LensSampler;
 use crate::scene::{Camera, CameraRays};
 use crate::simd;
@@ -87,20 +87,20 @@ impl Segment<'_> {
     /// The sample points of the pixel that ray `slot` of the segment goes through, and which of
     /// them is the ray's.
     #[must_use]
-    pub fn samples_of(&self, slot: u32, seed: u32) -> (PixelSamples, u32) {
+    pub fn samples_of<'s>(&self, slot: u32, sampling: &'s Sampling) -> (PixelSamples<'s>, u32) {
         let (x, y) = self.pixels[(slot / self.samples) as usize];
-        (PixelSamples::new(x, y, seed), self.first + slot % self.samples)
+        (sampling.pixel(x, y), self.first + slot % self.samples)
     }
 
     /// Fills `batch` with the camera rays.
-    pub fn camera_rays(&self, camera: &Camera, job: &Job, batch: &mut PacketBatch<RayHitPacket>) {
+    pub fn camera_rays(&self, camera: &Camera, job: &Job, sampling: &Sampling, batch: &mut PacketBatch<RayHitPacket>) {
         batch.resize(self.pixels.len() * self.samples as usize);
         let samples = self.first..self.first + self.samples;
         let mut points = self.pixels.iter().flat_map(|&pixel| samples.clone().map(move |sample| (pixel, sample)));
         let (mut at, mut lens) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
         for (packet, live) in batch.packets_mut() {
             for (lane, (pixel, sample)) in points.by_ref().take(live).enumerate() {
-                let (x, y, disc) = image_point(camera, job, pixel, sample);
+                let (x, y, disc) = image_point(camera, job, sampling, pixel, sample);
                 (at[0][lane], at[1][lane]) = (x, y);
                 (lens[0][lane], lens[1][lane]) = (disc.x, disc.y);
             }
@@ -111,14 +111,14 @@ impl Segment<'_> {
 
 /// Where sample `sample` of `pixel` goes through the image, in pixels, and through the unit lens.
 #[inline]
-fn image_point(camera: &Camera, job: &Job, pixel: (u32, u32), sample: u32) -> (f64, f64, DVec2) {
+fn image_point(camera: &Camera, job: &Job, sampling: &Sampling, pixel: (u32, u32), sample: u32) -> (f64, f64, DVec2) {
     let (x, y) = (f64::from(pixel.0), f64::from(pixel.1));
     let lone = if job.centre { CENTRE } else { BESIDE_CENTRE };
     if job.spp == 1 && camera.lens.is_none() {
         return (x + lone.0, y + lone.1, DVec2::ZERO);
     }
-    let samples = PixelSamples::new(pixel.0, pixel.1, job.seed);
-    let [a, b, u, v] = samples.point(sample).map(f64::from);
+    let samples = sampling.pixel(pixel.0, pixel.1);
+    let [a, b, u, v] = samples.point(sample);
     let spread = |a: f64| 0.5 + 2.0 * job.jitter_radius * (a - 0.5);
     let (dx, dy) = if job.spp == 1 { lone } else { (spread(a), spread(b)) };
     let disc = if camera.lens.is_some() { on_lens(job.lens_sampler, samples, sample, [u, v]) } else { DVec2::ZERO };
@@ -126,7 +126,7 @@ fn image_point(camera: &Camera, job: &Job, pixel: (u32, u32), sample: u32) -> (f
 }
 
 /// A point of the unit disc by the sampler that was asked for.
-fn on_lens(sampler: LensSampler, samples: PixelSamples, sample: u32, [u, v]: [f64; 2]) -> DVec2 {
+fn on_lens(sampler: LensSampler, samples: PixelSamples<'_>, sample: u32, [u, v]: [f64; 2]) -> DVec2 {
     match sampler {
         LensSampler::Concentric => concentric_disc(u, v),
         LensSampler::Polar => polar_disc(u, v),

@@ -16,6 +16,7 @@ use super::tile::Segment;
 use crate::backend::Backend;
 use crate::film::Aov;
 use crate::geom::{Coherence, INVALID_ID, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
+use crate::math::Sampling;
 use crate::scene::{Camera, Light, Needs, Object, Scene};
 use glam::{DVec3, Vec3};
 
@@ -74,6 +75,8 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
     /// Where highlights are seen from at every depth; `None`: from where each ray came.
     seen_from: Option<DVec3>,
     clip: Option<(f64, f64)>,
+    /// Where samples lie.
+    pub sampling: Sampling,
     palette: Palette,
     /// Of each material: whether it sends rays on.
     branching: Vec<bool>,
@@ -126,6 +129,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             lights: lights.copied().collect(),
             seen_from: scene.course_rules.then_some(camera.eye),
             clip: camera.clip,
+            sampling: job.sampling(),
             palette: Palette::of(scene),
             branching: scene.materials.iter().map(|m| m.reflects() || m.refracts()).collect(),
 
@@ -338,13 +342,13 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     /// Adds one light that has a size: a batch for each of its samples, and the share of them
     /// that got through.
     fn soft_light(&mut self, index: usize, segment: &Segment<'_>) {
-        let (light, rounds, seed) = (self.lights[index], self.job.light_samples.max(1), self.job.seed);
+        let (light, rounds, sampling) = (self.lights[index], self.job.light_samples.max(1), self.sampling);
         self.visible.clear();
         self.visible.resize(self.used, [0.0; LANES]);
         for round in 0..rounds {
             self.send_shadow_rays(|_, block, packet| {
                 let points = lights::points_on(block, &light, |lane| {
-                    let (samples, sample) = segment.samples_of(block.slot[lane], seed);
+                    let (samples, sample) = segment.samples_of(block.slot[lane], &sampling);
                     let number = sample.wrapping_mul(rounds).wrapping_add(round);
                     samples.on_light(number, index as u32, block.branch[lane])
                 });

@@ -6,3 +6,4 @@ mod glass;
 mod kit;
 mod light;
 mod places;
+mod sampling;
