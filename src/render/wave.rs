@@ -16,7 +16,6 @@ use super::tile::Segment;
 use crate::backend::Backend;
 use crate::film::Aov;
 use crate::geom::{Coherence, INVALID_ID, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
-use crate::math::Sampling;
 use crate::scene::{Camera, Light, Needs, Object, Scene};
 use glam::{DVec3, Vec3};
 
@@ -57,6 +56,8 @@ pub struct Tally {
     pub facing_away: u64,
     /// Branches below the weight cut.
     pub below_cut: u64,
+    /// Rays of all kinds that were sent to compare with, and are not counted above.
+    pub again: u64,
     /// Largest answer of a surface to all lights; kept only where a bound needs it.
     pub brightest: f32,
 }
@@ -75,8 +76,6 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
     /// Where highlights are seen from at every depth; `None`: from where each ray came.
     seen_from: Option<DVec3>,
     clip: Option<(f64, f64)>,
-    /// Where samples lie.
-    pub sampling: Sampling,
     palette: Palette,
     /// Of each material: whether it sends rays on.
     branching: Vec<bool>,
@@ -117,7 +116,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         contacts: &'a Contacts,
     ) -> Self {
         let cost = job.aovs.contains(&Aov::Cost).then(Vec::new);
-        let seen = job.aovs.iter().any(|&a| a != Aov::Cost).then(Vec::new);
+        let seen = job.aovs.iter().any(|&a| !matches!(a, Aov::Cost | Aov::Samples)).then(Vec::new);
         let lights = scene.lights.iter().filter(|l| needs.shadow_rays && l.color != Vec3::ZERO);
         let is_shapes: Vec<bool> = scene.objects.iter().map(|o| matches!(o, Object::Shapes(_))).collect();
         Self {
@@ -129,7 +128,6 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             lights: lights.copied().collect(),
             seen_from: scene.course_rules.then_some(camera.eye),
             clip: camera.clip,
-            sampling: job.sampling(),
             palette: Palette::of(scene),
             branching: scene.materials.iter().map(|m| m.reflects() || m.refracts()).collect(),
 
@@ -342,13 +340,13 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     /// Adds one light that has a size: a batch for each of its samples, and the share of them
     /// that got through.
     fn soft_light(&mut self, index: usize, segment: &Segment<'_>) {
-        let (light, rounds, sampling) = (self.lights[index], self.job.light_samples.max(1), self.sampling);
+        let (light, rounds) = (self.lights[index], self.job.light_samples.max(1));
         self.visible.clear();
         self.visible.resize(self.used, [0.0; LANES]);
         for round in 0..rounds {
             self.send_shadow_rays(|_, block, packet| {
                 let points = lights::points_on(block, &light, |lane| {
-                    let (samples, sample) = segment.samples_of(block.slot[lane], &sampling);
+                    let (samples, sample) = segment.samples_of(block.slot[lane]);
                     let number = sample.wrapping_mul(rounds).wrapping_add(round);
                     samples.on_light(number, index as u32, block.branch[lane])
                 });

@@ -5,6 +5,7 @@ mod commands;
 mod compare;
 mod images;
 mod probe;
+mod sampling;
 mod scenes;
 mod signals;
 mod verify;
