@@ -5,7 +5,7 @@
 //! |---|---|
 //! | `truth` | where a ray meets a shape, exactly |
 //! | `random`, `setup` | numbers, rays and scenes to measure with |
-//! | `textbook` | the shapes as books test them, in f32 |
+//! | `textbook`, `robust` | the shapes as books test them, in f32, and as careful ones do |
 //! | `wrong` | wrong answers about single shapes |
 //! | `closed` | rays in closed meshes: how many leak |
 //! | `leaving` | rays that leave surfaces: how many meet them again |
@@ -21,6 +21,7 @@ pub mod cost;
 pub mod leaving;
 pub mod plot;
 pub mod report;
+pub mod robust;
 pub mod setup;
 pub mod speed;
 pub mod stability;
