@@ -12,12 +12,14 @@
 //! | `cost` | the time of a test and of a refinement |
 //! | `stability` | all of that in one report |
 //! | `speed` | the native tracer against Embree |
+//! | `error` | run time against error of whole pictures |
 //! | `report`, `plot` | tables, pages, SVG |
 //!
 //! The tests ask the same questions with fewer rays.
 
 pub mod closed;
 pub mod cost;
+pub mod error;
 pub mod leaving;
 pub mod plot;
 pub mod report;

@@ -14,7 +14,7 @@ mod shade;
 mod shapes;
 mod surface;
 mod surfaces;
-mod tile;
+pub(crate) mod tile;
 mod wave;
 
 pub use explain::explain_pixel;
