@@ -19,7 +19,7 @@ mod shade;
 mod shapes;
 mod surface;
 mod surfaces;
-mod tile;
+pub(crate) mod tile;
 mod wave;
 mod worker;
 

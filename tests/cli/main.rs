@@ -3,6 +3,7 @@
 mod bad_input;
 mod commands;
 mod compare;
+mod error;
 mod images;
 mod probe;
 mod sampling;
