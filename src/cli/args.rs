@@ -122,7 +122,7 @@ pub enum Example {
 
 #[derive(Args, Debug)]
 pub struct CheckArgs {
-    /// Scene (.toml, .json, .ray) or mesh (.obj) to check
+    /// Scene (.toml, .json, .ray) or mesh (.obj, .ply) to check
     pub file: PathBuf,
     #[command(flatten)]
     pub reading: ReadingArgs,
@@ -133,7 +133,7 @@ pub struct CheckArgs {
 
 #[derive(Args, Debug)]
 pub struct InfoArgs {
-    /// Scene (.toml, .json, .ray) or mesh (.obj) to look at
+    /// Scene (.toml, .json, .ray) or mesh (.obj, .ply) to look at
     pub file: PathBuf,
     #[command(flatten)]
     pub reading: ReadingArgs,
@@ -151,7 +151,7 @@ pub struct ReadingArgs {
     /// A folder that the scene may name files in, besides its own; may be repeated
     #[arg(long, value_name = "DIR", help_heading = "Scene")]
     pub allow_path: Vec<PathBuf>,
-    /// Who reads meshes: tison's own reader, or the crate tobj as a second opinion
+    /// Who reads OBJ meshes: tison's own reader, or the crate tobj as a second opinion
     #[arg(
         long, value_name = "NAME", value_parser = obj_reader(), default_value = Reader::Own.name(),
         help_heading = "Scene"
@@ -161,7 +161,7 @@ pub struct ReadingArgs {
 
 #[derive(Args, Debug)]
 pub struct RenderArgs {
-    /// Scene (.toml, .json, .ray) or mesh (.obj) to render; a mesh is framed and lit unless told otherwise
+    /// Scene (.toml, .json, .ray) or mesh (.obj, .ply) to render; a mesh is framed and lit unless told otherwise
     #[arg(value_name = "FILE", required = true)]
     pub input: Option<PathBuf>,
 

@@ -41,7 +41,7 @@ pub fn outputs(args: &RenderArgs, input: &Path) -> Result<Vec<Output>, Failure> 
     let named: Vec<PathBuf> = if args.output.is_empty() {
         let stem = input.file_stem().ok_or_else(|| {
             Failure::usage(format!("{} names no file", input.display()))
-                .help("name a scene like scene.toml or a mesh like model.obj")
+                .help("name a scene like scene.toml or a mesh like model.obj or model.ply")
         })?;
         let mut name = stem.to_owned();
         name.push(".png");

@@ -35,6 +35,14 @@ pub enum Error {
         /// What is wrong, and what was expected.
         what: String,
     },
+    /// Something in a file that is no text, or with the file as a whole.
+    #[error("{}: {what}", path.display())]
+    Broken {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and where.
+        what: String,
+    },
     /// A mesh file with nothing to see in it.
     #[error("{}: no renderable faces: {why}", path.display())]
     NoFaces {

@@ -5,7 +5,7 @@ use super::format::{Diagnostic, Override};
 use super::freeze::{self, Assets, MeshFile, Wanted};
 use super::obj::{Reader, Uv};
 use super::texture::Encoding;
-use super::{Error, MeshPaint, Object, Scene, Warning};
+use super::{Error, MeshFormat, MeshPaint, Object, Scene, Warning};
 use glam::{DAffine3, Vec3};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -13,7 +13,7 @@ use std::sync::atomic::AtomicBool;
 /// How to read a scene.
 #[derive(Clone)]
 pub struct LoadOptions<'a> {
-    /// Who reads meshes.
+    /// Who reads OBJ meshes.
     pub reader: Reader,
     /// Crease angle in degrees for computing normals where the file has none; `None`: flat.
     pub smooth: Option<f64>,
@@ -88,8 +88,8 @@ pub struct Unused {
 /// Colour seen where nothing is hit, for a mesh that says nothing about it.
 const BACKGROUND: Vec3 = Vec3::new(0.055, 0.065, 0.08);
 
-/// Reads the scene in `path`: a `.toml`, `.json` or `.ray` scene file, or an `.obj` by itself.
-/// What is no plain file and has no extension, a pipe, is taken for an `.obj`.
+/// Reads the scene in `path`: a `.toml`, `.json` or `.ray` scene file, or a mesh ([`MeshFormat`]) by itself.
+/// What is no plain file and has no extension, a pipe, is taken for a mesh.
 ///
 /// A scene file that says nothing about them has a black background and no ambient light.
 ///
@@ -100,10 +100,7 @@ pub fn load(path: &Path, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
     if meta.is_dir() {
         return Err(Error::NotAFile { path: path.to_owned() });
     }
-    let bare = match path.extension() {
-        Some(extension) => extension.eq_ignore_ascii_case("obj"),
-        None => !meta.is_file(),
-    };
+    let bare = MeshFormat::of(path).is_some() || (path.extension().is_none() && !meta.is_file());
     if bare { load_mesh(path, options) } else { freeze::load(path, options) }
 }
 

@@ -5,6 +5,7 @@ mod commands;
 mod compare;
 mod error;
 mod images;
+mod meshes;
 mod probe;
 mod sampling;
 mod scenes;

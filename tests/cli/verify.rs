@@ -45,7 +45,7 @@ fn a_scene_has_the_readers_of_its_meshes_compared() {
     assert_eq!(told["readers"][0]["triangles"], 4);
     bench.write("t.toml", "tison = 1\n[[object]]\nshape = \"sphere\"\n");
     let out = bench.expect("verify --readers t.toml", 0);
-    assert!(text(&out.stdout).contains("no mesh file"), "{}", text(&out.stdout));
+    assert!(text(&out.stdout).contains("no OBJ file"), "{}", text(&out.stdout));
 }
 
 #[test]

@@ -135,7 +135,7 @@ fn images_of_a_library_that_cannot_be_used_are_warnings() {
         told,
         [
             "a.mtl:2: image 'gone.png' is not there: Kd is used alone (and 1 more like it)",
-            "a.obj: it has no texture coordinates ('vt'): the images of its materials are not shown",
+            "a.obj: it has no texture coordinates: the images of its materials are not shown",
             "broken.png: the image is no PNG, JPEG, BMP, HDR or PNM image; Kd is used alone",
         ]
     );

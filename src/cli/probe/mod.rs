@@ -49,7 +49,7 @@ Each answer is a line, {"hit":false} for a miss:
 #[derive(Args, Debug)]
 #[command(after_long_help = AFTER_HELP)]
 pub struct ProbeArgs {
-    /// Scene (.toml, .json, .ray) or mesh (.obj) to cast rays at; without one each line has a shape of its own
+    /// Scene (.toml, .json, .ray) or mesh (.obj, .ply) to cast rays at; without one each line has a shape of its own
     pub scene: Option<PathBuf>,
     /// Who answers the rays
     #[arg(long, value_name = "NAME", value_parser = Backends::parser_of_one())]

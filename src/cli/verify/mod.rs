@@ -23,7 +23,7 @@ use std::time::Instant;
 use tison::film;
 use tison::math::Frame;
 use tison::render::Control;
-use tison::scene::Loaded;
+use tison::scene::{Loaded, MeshFormat};
 use tison::verify::Report;
 use tison::verify::readers::{self, Compared};
 
@@ -37,7 +37,7 @@ the others as for tison render.";
 
 #[derive(Args, Debug)]
 pub struct VerifyArgs {
-    /// Scene (.toml, .json, .ray) or mesh (.obj) to send rays through
+    /// Scene (.toml, .json, .ray) or mesh (.obj, .ply) to send rays through
     #[arg(value_name = "FILE")]
     pub input: PathBuf,
     #[command(flatten)]
@@ -60,7 +60,7 @@ pub struct VerifyArgs {
         allow_negative_numbers = true
     )]
     pub threads: Option<u16>,
-    /// Compare the readers of meshes only; works without Embree too
+    /// Compare the readers of OBJ files only; works without Embree too
     #[arg(long, conflicts_with_all = ["rays", "size", "seed"])]
     pub readers: bool,
     /// One JSON object on stdout instead of the table, or in FILE beside it
@@ -95,7 +95,7 @@ pub fn verify(args: &VerifyArgs, messages: &Messages) -> Result<Exit, Failure> {
     Input::of(&args.input).check_reading(&args.reading, &args.input)?;
     if !args.readers && !cfg!(feature = "embree") {
         let what = "this tison was built without Embree: there is one backend, and nothing to compare it with";
-        return Err(Failure::usage(what).help("--readers compares the readers of meshes, which needs no Embree"));
+        return Err(Failure::usage(what).help("--readers compares the readers of OBJ files, which needs no Embree"));
     }
     let target = args.json.clone().map(Target::of);
     if let Some(Target::File(path)) = &target {
@@ -159,11 +159,11 @@ impl<'a> Run<'a, '_> {
         Ok(Story { file: &args.input, seed: args.seed, size, aimed, backends, frame, readers, seconds })
     }
 
-    /// Every mesh file that was read.
+    /// Every OBJ file that was read.
     fn compare_readers(&self, loaded: &Loaded) -> Result<Vec<Compared>, Failure> {
-        let is_mesh = |path: &&PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
+        let is_obj = |path: &&PathBuf| MeshFormat::of(path) == Some(MeshFormat::Obj);
         // A pipe is empty by now.
-        let meshes = loaded.files.iter().filter(is_mesh).filter(|path| path.is_file());
+        let meshes = loaded.files.iter().filter(is_obj).filter(|path| path.is_file());
         let compare = |path: &PathBuf| {
             readers::compare(path, &self.args.reading.allow_path, &self.control.cancel).map_err(Failure::from)
         };

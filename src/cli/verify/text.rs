@@ -32,7 +32,7 @@ pub fn of(story: &Story<'_>) -> String {
         (Some(_), false) => "backends and readers",
         (None, false) => "readers",
         (None, true) => {
-            let _ = writeln!(out, "\nno mesh file: there are no readers to compare");
+            let _ = writeln!(out, "\nno OBJ file: there are no readers to compare");
             return out;
         }
     };

@@ -5,7 +5,7 @@ use super::mtl;
 use crate::geom::{self, TriangleMesh};
 use crate::math::Frame;
 use crate::scene::obj::{self, CornerData, MtlMaterial, Uv};
-use crate::scene::{Error, Instance, Material, Mesh, MeshData, MeshPaint, Object, Warning, smooth};
+use crate::scene::{Error, Instance, Material, Mesh, MeshData, MeshPaint, Object, Warning, read_mesh, smooth};
 use glam::{DAffine3, DMat3, Vec3};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -49,7 +49,7 @@ impl MeshFile {
             cancel: assets.options.cancel,
             progress,
         };
-        let file = obj::read(path, &read)?;
+        let file = read_mesh(path, &read)?;
         assets.meshes.push(path.to_owned());
         assets.warnings.extend(file.warnings);
         assets.unused.materials += file.counts.unused_materials as usize;
@@ -68,7 +68,7 @@ impl MeshFile {
         match &mut uvs {
             Some(uvs) if !wanted.v_down => turn_v(uvs),
             None if sampled => {
-                let what = "it has no texture coordinates ('vt'): the images of its materials are not shown";
+                let what = "it has no texture coordinates: the images of its materials are not shown";
                 assets.warnings.push(Warning::about(path, what.into()));
             }
             _ => {}

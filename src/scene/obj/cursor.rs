@@ -2,7 +2,7 @@
 
 /// What a line says, by its first word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Statement {
+pub(in crate::scene) enum Statement {
     Vertex,
     Texture,
     Normal,
@@ -15,7 +15,7 @@ pub(super) enum Statement {
 
 /// A place in `text`. Reading never goes past the end of the line.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Cursor<'a> {
+pub(in crate::scene) struct Cursor<'a> {
     text: &'a [u8],
     pos: usize,
 }
@@ -26,18 +26,18 @@ const POWERS: [f64; 23] = [
 ];
 
 impl<'a> Cursor<'a> {
-    pub(super) fn new(text: &'a [u8]) -> Self {
+    pub(in crate::scene) fn new(text: &'a [u8]) -> Self {
         Self { text, pos: 0 }
     }
 
     /// Bytes before the cursor.
     #[inline]
-    pub(super) fn pos(&self) -> usize {
+    pub(in crate::scene) fn pos(&self) -> usize {
         self.pos
     }
 
     #[inline]
-    pub(super) fn at_end(&self) -> bool {
+    pub(in crate::scene) fn at_end(&self) -> bool {
         self.pos >= self.text.len()
     }
 
@@ -62,7 +62,7 @@ impl<'a> Cursor<'a> {
 
     /// Goes behind the first word of a line if it is one that carries geometry.
     #[inline]
-    pub(super) fn statement(&mut self) -> Statement {
+    pub(in crate::scene) fn statement(&mut self) -> Statement {
         self.skip_blanks();
         let (first, second) = (self.peek(), self.peek_at(1));
         let (statement, length) = match first {
@@ -80,21 +80,29 @@ impl<'a> Cursor<'a> {
     /// Goes to the next word of the line; `false` if there is none before the line ends or
     /// a comment begins.
     #[inline]
-    pub(super) fn more(&mut self) -> bool {
+    pub(in crate::scene) fn more(&mut self) -> bool {
         self.skip_blanks();
         !matches!(self.peek(), b'\n' | b'#')
     }
 
     /// Whether a word could end here.
     #[inline]
-    pub(super) fn word_ends(&self) -> bool {
+    pub(in crate::scene) fn word_ends(&self) -> bool {
         let c = self.peek();
         c <= b' ' || c == b'#'
     }
 
+    /// Goes behind the word under the cursor.
+    #[inline]
+    pub(in crate::scene) fn skip_word(&mut self) {
+        while !self.word_ends() {
+            self.pos += 1;
+        }
+    }
+
     /// Goes to the start of the next line.
     #[inline]
-    pub(super) fn next_line(&mut self) {
+    pub(in crate::scene) fn next_line(&mut self) {
         if self.peek() == b'\n' {
             self.pos += 1;
             return;
@@ -104,13 +112,13 @@ impl<'a> Cursor<'a> {
     }
 
     /// What is left of the line, the line end left out.
-    pub(super) fn line(&self) -> &'a [u8] {
+    pub(in crate::scene) fn line(&self) -> &'a [u8] {
         let rest = &self.text[self.pos.min(self.text.len())..];
         &rest[..memchr::memchr(b'\n', rest).unwrap_or(rest.len())]
     }
 
     /// The word under the cursor.
-    pub(super) fn word(&self) -> &'a [u8] {
+    pub(in crate::scene) fn word(&self) -> &'a [u8] {
         let line = self.line();
         &line[..line.iter().position(|&c| c <= b' ').unwrap_or(line.len())]
     }
@@ -118,7 +126,7 @@ impl<'a> Cursor<'a> {
     /// Reads a decimal number, correctly rounded. `None` if there is none; the cursor then
     /// stays somewhere in the word. What follows the number is for the caller to judge.
     #[inline]
-    pub(super) fn number(&mut self) -> Option<f64> {
+    pub(in crate::scene) fn number(&mut self) -> Option<f64> {
         let negative = self.sign();
         let start = self.pos;
         let mut digits = 0u64;
@@ -174,7 +182,7 @@ impl<'a> Cursor<'a> {
 
     /// Reads a whole number. `None` if there is none; saturates far beyond any index.
     #[inline]
-    pub(super) fn integer(&mut self) -> Option<i64> {
+    pub(in crate::scene) fn integer(&mut self) -> Option<i64> {
         let negative = self.sign();
         let start = self.pos;
         let mut value = 0;
@@ -189,7 +197,7 @@ impl<'a> Cursor<'a> {
 
     /// Whether the next byte is `c`, which is then skipped.
     #[inline]
-    pub(super) fn take(&mut self, c: u8) -> bool {
+    pub(in crate::scene) fn take(&mut self, c: u8) -> bool {
         let found = self.peek() == c;
         self.pos += usize::from(found);
         found
@@ -197,14 +205,14 @@ impl<'a> Cursor<'a> {
 
     /// Whether the next byte is the slash between the indices of a corner.
     #[inline]
-    pub(super) fn at_slash(&self) -> bool {
+    pub(in crate::scene) fn at_slash(&self) -> bool {
         self.peek() == b'/'
     }
 
     /// How many words there are before the line ends or a comment begins. The cursor goes
     /// to the end of the line, or somewhere in the comment.
     #[inline]
-    pub(super) fn count_words(&mut self) -> u64 {
+    pub(in crate::scene) fn count_words(&mut self) -> u64 {
         const LINE_END: u64 = ONES * b'\n' as u64;
         let (mut count, mut before) = (0, 0);
         loop {

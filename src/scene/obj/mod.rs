@@ -11,23 +11,26 @@
 //! in the order of the file, with the winding of the file.
 
 mod corners;
-mod cursor;
+pub(super) mod cursor;
+pub(super) mod fans;
 mod materials;
 mod mtl;
 mod notes;
-mod parse;
+pub(super) mod parse;
 mod pieces;
+pub(super) mod points;
 mod polygon;
 mod read;
 mod second;
-mod source;
 mod survey;
 #[cfg(test)]
 mod tests;
 
 pub use corners::CornerData;
 pub use mtl::MtlMaterial;
+pub(super) use notes::with_more;
 
+use super::source::Source;
 use super::{Error, Warning};
 use crate::math::Frame;
 use std::path::{Path, PathBuf};
@@ -92,7 +95,7 @@ pub enum Uv {
 
 impl ReadOptions<'_> {
     /// Whether texture coordinates are wanted on faces that have `materials`.
-    fn wants_uv(&self, materials: &[MtlMaterial]) -> bool {
+    pub(super) fn wants_uv(&self, materials: &[MtlMaterial]) -> bool {
         match self.uv {
             Uv::Never => false,
             Uv::IfTextured => materials.iter().any(|m| m.map_kd.is_some()),
@@ -110,7 +113,7 @@ impl std::fmt::Debug for ReadOptions<'_> {
     }
 }
 
-/// A mesh as its file has it.
+/// A mesh as its file, OBJ or [PLY](super::ply), has it.
 #[derive(Debug)]
 pub struct ObjFile {
     /// Where the stored points lie in the file's coordinates.
@@ -176,10 +179,14 @@ pub struct Counts {
 /// [`Error::TooMany`] beyond what 32-bit indices can count, [`Error::Cancelled`];
 /// [`Error::SecondReader`] for what tobj cannot read, if it is asked.
 pub fn read(path: &Path, options: &ReadOptions<'_>) -> Result<ObjFile, Error> {
-    let source = source::Source::open(path, options.cancel)?;
+    read_source(&Source::open(path, options.cancel)?, options)
+}
+
+/// The same for a file that is open.
+pub(super) fn read_source(source: &Source, options: &ReadOptions<'_>) -> Result<ObjFile, Error> {
     match options.reader {
-        Reader::Own => read::read(&source, options, PIECE),
-        Reader::Tobj => second::read(&source, options, PIECE),
+        Reader::Own => read::read(source, options, PIECE),
+        Reader::Tobj => second::read(source, options, PIECE),
     }
 }
 
@@ -189,11 +196,20 @@ pub fn read(path: &Path, options: &ReadOptions<'_>) -> Result<ObjFile, Error> {
 /// # Errors
 /// As [`read`].
 pub fn line_of_triangle(path: &Path, triangle: u64, options: &ReadOptions<'_>) -> Result<Option<u64>, Error> {
-    read::line_of_triangle(&source::Source::open(path, options.cancel)?, triangle, options, PIECE)
+    read::line_of_triangle(&Source::open(path, options.cancel)?, triangle, options, PIECE)
 }
 
 /// Bytes of a piece: small enough for a second-level cache, large enough to make each piece's own cost vanish.
 const PIECE: u64 = 1 << 18;
+
+/// Things must be countable by 32 bits, with one number to spare for "none".
+pub(super) fn check_count(source: &Source, what: &'static str, count: u64) -> Result<(), Error> {
+    const LIMIT: u64 = u32::MAX as u64 - 1;
+    if count <= LIMIT {
+        return Ok(());
+    }
+    Err(Error::TooMany { path: source.path.clone(), what, count, limit: LIMIT })
+}
 
 /// Bytes as text, whatever they are.
 fn text(bytes: &[u8]) -> String {
@@ -201,7 +217,7 @@ fn text(bytes: &[u8]) -> String {
 }
 
 /// Bytes as they may appear in a message: not long, and nothing a terminal obeys.
-fn excerpt(bytes: &[u8]) -> String {
+pub(super) fn excerpt(bytes: &[u8]) -> String {
     const MOST: usize = 40;
     let whole = String::from_utf8_lossy(&bytes[..bytes.len().min(4 * MOST)]);
     let shown: String = whole.chars().take(MOST).map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();

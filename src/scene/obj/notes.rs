@@ -143,7 +143,7 @@ impl Note {
 }
 
 /// `what`, and how many more there are.
-pub(super) fn with_more(what: String, count: u64) -> String {
+pub(in crate::scene) fn with_more(what: String, count: u64) -> String {
     if count > 1 { format!("{what} (and {} more like it)", count - 1) } else { what }
 }
 

@@ -1,14 +1,16 @@
 //! Second pass: parses a piece of the file straight into its place in the result.
 
 use super::cursor::{Cursor, Statement};
+use super::fans::Continues;
 use super::notes::{Kind, Notes};
+use super::points::PointWriter;
 use super::survey::Tally;
 use super::{CornerData, excerpt};
 use crate::math::Frame;
 use glam::DVec3;
 
 /// Largest coordinate taken: differences of such numbers are still finite.
-pub(super) const LARGEST: f64 = 1e300;
+pub(in crate::scene) const LARGEST: f64 = 1e300;
 
 /// Why a piece could not be parsed.
 #[derive(Debug)]
@@ -54,18 +56,10 @@ pub(super) struct Usage {
 pub(super) struct Parsed {
     /// Largest stored coordinate, before it was rounded to f32.
     pub(super) reach: f64,
-    /// A bit per triangle: it continues the polygon of the one before. Empty if none does.
-    pub(super) continues: Vec<u64>,
+    pub(super) continues: Continues,
     pub(super) normals: Usage,
     pub(super) uvs: Usage,
     pub(super) notes: Notes,
-}
-
-impl Parsed {
-    /// Whether triangle `t` of the piece continues the polygon of the one before.
-    pub(super) fn continues(&self, t: usize) -> bool {
-        self.continues.get(t / 64).is_some_and(|bits| bits >> (t % 64) & 1 == 1)
-    }
 }
 
 /// Parses `text`; `before` is what comes before it, `start` its place in the file.
@@ -110,50 +104,25 @@ pub(super) fn parse_points(text: &[u8], frame: &Frame, points: &mut [f32]) -> Re
 
 /// Writes what rounding takes from the points of `text` in their frame.
 pub(super) fn parse_rests(text: &[u8], frame: &Frame, rests: &mut [f32]) -> Result<(), Trouble> {
-    each_point(text, PointWriter { rests: true, ..PointWriter::new(frame, rests) }).map(|_| ())
+    each_point(text, PointWriter::of_rests(frame, rests)).map(|_| ())
 }
 
 fn each_point(text: &[u8], mut writer: PointWriter<'_>) -> Result<f64, Trouble> {
     let mut c = Cursor::new(text);
     while !c.at_end() {
         if c.statement() == Statement::Vertex {
-            writer.write(&mut c)?;
+            put_point(&mut writer, &mut c)?;
         }
         c.next_line();
     }
-    writer.finish()
+    writer.finish().ok_or(Trouble::Changed)
 }
 
-/// Puts points into a frame and rounds them, once.
-struct PointWriter<'a> {
-    origin: DVec3,
-    local_per_world: f64,
-    slots: std::slice::ChunksExactMut<'a, f32>,
-    /// Whether what is rounded off is written instead.
-    rests: bool,
-    reach: f64,
-}
-
-impl<'a> PointWriter<'a> {
-    fn new(frame: &Frame, points: &'a mut [f32]) -> Self {
-        let slots = points.chunks_exact_mut(3);
-        Self { origin: frame.origin, local_per_world: frame.local_per_world(), slots, rests: false, reach: 0.0 }
-    }
-
-    #[inline]
-    fn write(&mut self, c: &mut Cursor<'_>) -> Result<(), Trouble> {
-        let world = DVec3::new(coordinate(c)?, coordinate(c)?, coordinate(c)?);
-        let local = (world - self.origin) * self.local_per_world;
-        self.reach = self.reach.max(local.abs().max_element());
-        let rounded = local.as_vec3();
-        let written = if self.rests { (local - rounded.as_dvec3()).as_vec3() } else { rounded };
-        self.slots.next().ok_or(Trouble::Changed)?.copy_from_slice(&written.to_array());
-        Ok(())
-    }
-
-    fn finish(self) -> Result<f64, Trouble> {
-        if self.slots.len() == 0 { Ok(self.reach) } else { Err(Trouble::Changed) }
-    }
+/// Reads a point and writes it.
+#[inline]
+fn put_point(writer: &mut PointWriter<'_>, c: &mut Cursor<'_>) -> Result<(), Trouble> {
+    let world = DVec3::new(coordinate(c)?, coordinate(c)?, coordinate(c)?);
+    writer.put(world).ok_or(Trouble::Changed)
 }
 
 struct Parser<'a> {
@@ -182,7 +151,7 @@ struct Corner {
 impl Parser<'_> {
     #[inline]
     fn vertex(&mut self, c: &mut Cursor<'_>, start: u64) -> Result<(), Trouble> {
-        self.points.write(c)?;
+        put_point(&mut self.points, c)?;
         self.before.vertices += 1;
         if c.more() {
             // One more number is a weight, three are a colour.
@@ -242,10 +211,7 @@ impl Parser<'_> {
         write_unless_zero(self.normal_of, t, [a.normal, b.normal, c.normal]);
         write_unless_zero(self.uv_of, t, [a.uv, b.uv, c.uv]);
         if continues {
-            if self.found.continues.is_empty() {
-                self.found.continues = vec![0; self.faces.len().div_ceil(64)];
-            }
-            self.found.continues[t / 64] |= 1 << (t % 64);
+            self.found.continues.set(t, self.faces.len());
         }
         self.triangles += 1;
         Ok(())
@@ -279,7 +245,7 @@ impl Parser<'_> {
     }
 
     fn finish(mut self) -> Result<Parsed, Trouble> {
-        self.found.reach = self.points.finish()?;
+        self.found.reach = self.points.finish().ok_or(Trouble::Changed)?;
         let complete = self.triangles == self.faces.len() && self.normals.len() == 0 && self.uvs.len() == 0;
         if complete { Ok(self.found) } else { Err(Trouble::Changed) }
     }
@@ -296,7 +262,7 @@ fn write_unless_zero(slots: &mut [[u32; 3]], t: usize, value: [u32; 3]) {
 }
 
 /// `n` with length one; zero stays zero.
-pub(super) fn unit(n: DVec3) -> DVec3 {
+pub(in crate::scene) fn unit(n: DVec3) -> DVec3 {
     let squared = n.length_squared();
     if (1e-200..1e200).contains(&squared) {
         return n / squared.sqrt();

@@ -1,15 +1,14 @@
 //! Works on all pieces of a file at once.
 
 use super::super::Error;
+use super::super::parallel::in_order;
+use super::super::source::Source;
 use super::ReadOptions;
 use super::parse::Trouble;
-use super::source::Source;
 use super::survey::Survey;
-use rayon::prelude::*;
 use std::io;
 use std::ops::Range;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A file, cut.
 pub(super) struct Pieces<'a> {
@@ -28,7 +27,7 @@ enum Stop {
 
 impl<'a> Pieces<'a> {
     pub(super) fn cut(source: &'a Source, options: &'a ReadOptions<'a>, size: u64) -> Result<Self, Error> {
-        Ok(Self { source, options, ranges: source.pieces(size)?, done: AtomicU64::new(0) })
+        Ok(Self { source, options, ranges: source.pieces(0..source.len, size)?, done: AtomicU64::new(0) })
     }
 
     /// Calls `work(piece, job, lines, joined)` for every piece: its number, its job, its
@@ -40,35 +39,12 @@ impl<'a> Pieces<'a> {
         R: Send,
         F: Fn(usize, J, &[u8], u64) -> Result<R, Trouble> + Sync,
     {
-        let first_bad = AtomicUsize::new(usize::MAX);
-        let queue = Mutex::new(jobs.into_iter().enumerate());
-        let next = || queue.lock().expect("nothing panics while it holds the lock").next();
-        let worker = |_| {
-            let (mut buf, mut out) = (Vec::new(), Vec::new());
-            while let Some((i, job)) = next() {
-                if i > first_bad.load(Ordering::Relaxed) {
-                    break;
-                }
-                let result = self.one(i, &mut buf, |lines, joined| work(i, job, lines, joined));
-                if result.is_err() {
-                    first_bad.fetch_min(i, Ordering::Relaxed);
-                }
-                out.push((i, result));
-            }
-            out
-        };
-        let workers = rayon::current_num_threads().min(self.ranges.len());
-        let mut results: Vec<_> = (0..workers).into_par_iter().with_max_len(1).flat_map_iter(worker).collect();
-        results.sort_unstable_by_key(|&(i, _)| i);
-        results
-            .into_iter()
-            .map(|(i, result)| {
-                result.map_err(|stop| match stop {
-                    Stop::Error(e) => e,
-                    Stop::Trouble(t) => self.located(i, t, surveys),
-                })
-            })
-            .collect()
+        let work = |i, job, buf: &mut Vec<u8>| self.one(i, buf, |lines, joined| work(i, job, lines, joined));
+        let numbered = |i, job, buf: &mut Vec<u8>| work(i, job, buf).map_err(|stop| (i, stop));
+        in_order(jobs, numbered).map_err(|(i, stop)| match stop {
+            Stop::Error(e) => e,
+            Stop::Trouble(t) => self.located(i, t, surveys),
+        })
     }
 
     fn one<R>(

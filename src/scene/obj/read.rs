@@ -1,26 +1,18 @@
 //! Puts the passes together.
 
+use super::super::parallel::cut;
+use super::super::source::Source;
 use super::super::{Error, Warning};
+use super::fans;
 use super::materials::{Described, LibraryStatement, Runs, describe};
 use super::notes::{Kind, Notes};
 use super::parse::{self, Parsed, Plan, Target, Usage};
 use super::pieces::Pieces;
-use super::polygon;
-use super::source::Source;
-use super::survey::{self, Sampling, Survey, Tally, cut, running_totals};
+use super::points;
+use super::survey::{self, Sampling, Survey, Tally, running_totals};
 use super::{CornerData, Counts, ObjFile, ReadOptions};
 use crate::math::Frame;
-use glam::Vec3;
 use rayon::prelude::*;
-
-/// Sizes that a stored mesh may have, as multiples of what the sample of its vertices led
-/// to expect; beyond them the frame is made anew.
-const FITTING: std::ops::RangeInclusive<f64> = 1.0 / 65_536.0..=4_294_967_296.0;
-
-/// Whether a mesh of which the sample expects a size of about 1 may have this one.
-pub(super) fn fits(reach: f64) -> bool {
-    FITTING.contains(&reach)
-}
 
 /// Reads `source` in pieces of about `piece` bytes.
 pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Result<ObjFile, Error> {
@@ -212,52 +204,31 @@ fn settle(of: &mut Option<Option<Vec<[u32; 3]>>>, values: &mut Vec<f32>, usage: 
     });
 }
 
-/// Everything must be countable by 32 bits, with one number to spare for "none".
+/// Everything must be countable.
 pub(super) fn check_size(total: &Tally, pieces: &Pieces<'_>) -> Result<(), Error> {
-    const LIMIT: u64 = u32::MAX as u64 - 1;
     let all = [
         ("vertices", total.vertices),
         ("texture coordinates", total.textures),
         ("normals", total.normals),
         ("triangles", total.triangles),
     ];
-    match all.into_iter().find(|&(_, count)| count > LIMIT) {
-        Some((what, count)) => Err(Error::TooMany { path: pieces.source.path.clone(), what, count, limit: LIMIT }),
-        None => Ok(()),
-    }
+    all.into_iter().try_for_each(|(what, count)| super::check_count(pieces.source, what, count))
 }
 
-/// Makes sure that the frame, which a sample of the vertices led to, suits all that faces
-/// use, and writes the points anew in another one if not. Returns the frame they are in.
+/// [`points::settle_frame`] for a file that was parsed.
 fn settle_frame(
     pieces: &Pieces<'_>,
     surveys: &[Survey],
     arrays: &mut Arrays,
-    mut frame: Frame,
+    frame: Frame,
     parsed: &[Parsed],
 ) -> Result<Frame, Error> {
-    let mut reached = parsed.iter().map(|p| p.reach).fold(0.0, f64::max);
-    if FITTING.contains(&reached) {
-        return Ok(frame);
-    }
-    // Once for what the sample missed; more often only where a vertex that no face uses is
-    // so far away that what faces use can only be approached in steps.
-    loop {
-        let used = used_reach(&arrays.points, &arrays.faces).min(f64::from(f32::MAX));
-        let better = frame.rescaled(used);
-        if FITTING.contains(&used) || better == frame {
-            break;
-        }
-        frame = better;
-        let parts = cut(&mut arrays.points, surveys.iter().map(|s| 3 * s.tally.vertices as usize));
-        let all = pieces.each(parts, surveys, |_, points, text, _| parse::parse_points(text, &frame, points))?;
-        reached = all.into_iter().fold(0.0, f64::max);
-    }
-    if reached > f64::from(f32::MAX) {
-        // Only vertices that no face uses can be so far away.
-        arrays.points.par_iter_mut().for_each(|x| *x = x.clamp(-f32::MAX, f32::MAX));
-    }
-    Ok(frame)
+    let reach = parsed.iter().map(|p| p.reach).fold(0.0, f64::max);
+    points::settle_frame(&mut arrays.points, &arrays.faces, frame, reach, |frame, points| {
+        let parts = cut(points, surveys.iter().map(|s| 3 * s.tally.vertices as usize));
+        let all = pieces.each(parts, surveys, |_, points, text, _| parse::parse_points(text, frame, points))?;
+        Ok(all.into_iter().fold(0.0, f64::max))
+    })
 }
 
 /// What rounding took from `points`, which are in `frame`.
@@ -268,83 +239,17 @@ fn rests(pieces: &Pieces<'_>, surveys: &[Survey], points: &[f32], frame: &Frame)
     Ok(rests)
 }
 
-/// Largest coordinate of the vertices that faces use.
-fn used_reach(points: &[f32], faces: &[[u32; 3]]) -> f64 {
-    let reach = |i: u32| points[3 * i as usize..][..3].iter().fold(0.0, |m: f32, x| m.max(x.abs()));
-    let largest = faces.par_iter().map(|f| f.iter().fold(0.0, |m: f32, &i| m.max(reach(i)))).reduce(|| 0.0, f32::max);
-    f64::from(largest)
-}
-
 /// Splits the polygons anew that a fan does not cover. Returns how many those are.
 fn split_polygons(arrays: &mut Arrays, surveys: &[Survey], parsed: &[Parsed]) -> u64 {
     if parsed.iter().all(|p| p.continues.is_empty()) {
         return 0;
     }
     let points = std::mem::take(&mut arrays.points);
-    let clipped = arrays
-        .targets_of_faces(surveys)
-        .into_par_iter()
-        .zip(parsed)
-        .map(|(mut target, found)| split_in_piece(&points, &mut target, found))
-        .sum();
+    let targets = arrays.targets(surveys).into_par_iter().zip(parsed);
+    let clipped =
+        targets.map(|(t, found)| fans::split(&points, t.faces, [t.normal_of, t.uv_of], &found.continues)).sum();
     arrays.points = points;
     clipped
-}
-
-/// A piece's part of the arrays that have an entry per triangle.
-struct FaceTarget<'a> {
-    faces: &'a mut [[u32; 3]],
-    others: [&'a mut [[u32; 3]]; 2],
-}
-
-impl Arrays {
-    fn targets_of_faces(&mut self, surveys: &[Survey]) -> Vec<FaceTarget<'_>> {
-        self.targets(surveys)
-            .into_iter()
-            .map(|t| FaceTarget { faces: t.faces, others: [t.normal_of, t.uv_of] })
-            .collect()
-    }
-}
-
-fn split_in_piece(points: &[f32], target: &mut FaceTarget<'_>, found: &Parsed) -> u64 {
-    if found.continues.is_empty() {
-        return 0;
-    }
-    let (mut clipped, mut corners) = (0, Vec::new());
-    let mut first = 0;
-    while first < target.faces.len() {
-        let more = (first + 1..target.faces.len()).take_while(|&t| found.continues(t)).count();
-        let polygon = first..first + more + 1;
-        first = polygon.end;
-        if more == 0 {
-            continue;
-        }
-        corners.clear();
-        let fan = &target.faces[polygon.clone()];
-        corners.extend(fan_corners(fan).map(|i| Vec3::from_slice(&points[3 * i as usize..])));
-        if let Some(triangles) = polygon::split(&corners) {
-            clipped += 1;
-            for all in std::iter::once(&mut *target.faces).chain(target.others.iter_mut().map(|o| &mut **o)) {
-                if let Some(fan) = all.get_mut(polygon.clone()) {
-                    rewrite(fan, &triangles);
-                }
-            }
-        }
-    }
-    clipped
-}
-
-/// The corners of the polygon that a fan was made of.
-pub(super) fn fan_corners(fan: &[[u32; 3]]) -> impl Iterator<Item = u32> {
-    fan[0][..2].iter().copied().chain(fan.iter().map(|t| t[2]))
-}
-
-/// Replaces a fan by `triangles` over its corners.
-pub(super) fn rewrite(fan: &mut [[u32; 3]], triangles: &[[u32; 3]]) {
-    let corners: Vec<u32> = fan_corners(fan).collect();
-    for (slot, t) in fan.iter_mut().zip(triangles) {
-        *slot = t.map(|k| corners[k as usize]);
-    }
 }
 
 pub(super) fn gather(surveys: &mut [Survey], parsed: &mut [Parsed]) -> Notes {

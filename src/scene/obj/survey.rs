@@ -170,20 +170,6 @@ pub(super) fn running_totals(surveys: &[Survey]) -> (Vec<Tally>, Tally) {
     (before, total)
 }
 
-/// Cuts `all` into consecutive parts of the given lengths.
-///
-/// # Panics
-/// If the lengths add up to more than there is.
-pub(super) fn cut<T>(mut all: &mut [T], lengths: impl Iterator<Item = usize>) -> Vec<&mut [T]> {
-    lengths
-        .map(|n| {
-            let (part, rest) = std::mem::take(&mut all).split_at_mut(n);
-            all = rest;
-            part
-        })
-        .collect()
-}
-
 /// The byte of the file at which the face begins that triangle `wanted` of this piece is made of.
 pub(super) fn place_of_triangle(text: &[u8], start: u64, wanted: u64) -> Option<u64> {
     let mut c = Cursor::new(text);

@@ -1,7 +1,7 @@
 //! Odd input, and that neither pieces nor threads change a result.
 
 use super::super::Error;
-use super::source::Source;
+use super::super::source::Source;
 use super::*;
 use glam::DVec3;
 use proptest::prelude::*;

@@ -13,12 +13,13 @@ mod lines;
 
 use super::parse::{LARGEST, unit};
 use super::pieces::Pieces;
-use super::read::{Materials, check_size, counts, fits, gather, warnings};
-use super::source::Source;
+use super::points::fits;
+use super::read::{Materials, check_size, counts, gather, warnings};
 use super::survey::{Sampling, Survey, running_totals, survey};
 use super::{CornerData, Counts, ObjFile, ReadOptions, polygon};
 use crate::math::Frame;
 use crate::scene::Error;
+use crate::scene::source::Source;
 use glam::{DVec3, Vec3};
 use lines::Lines;
 use std::collections::HashMap;
@@ -182,12 +183,12 @@ impl Joined {
         for &(first, count) in &self.polygons {
             let fan = first..first + count;
             corners.clear();
-            let of = super::read::fan_corners(&self.faces[fan.clone()]);
+            let of = super::fans::fan_corners(&self.faces[fan.clone()]);
             corners.extend(of.map(|i| frame.to_local(self.points[i as usize]).as_vec3()));
             let Some(triangles) = polygon::split(&corners) else { continue };
             clipped += 1;
             for all in [&mut self.faces, &mut self.normals.indices, &mut self.uvs.indices] {
-                super::read::rewrite(&mut all[fan.clone()], &triangles);
+                super::fans::rewrite(&mut all[fan.clone()], &triangles);
             }
         }
         clipped

@@ -1,6 +1,6 @@
 //! The bytes of a file, read piece by piece, and the places where it can be cut.
 
-use super::super::Error;
+use super::Error;
 use memchr::memchr_iter;
 use std::fs::File;
 use std::io::{self, Read};
@@ -52,7 +52,7 @@ impl Source {
     }
 
     /// Fills `buf` with the bytes of `range`.
-    fn bytes(&self, range: Range<u64>, buf: &mut Vec<u8>) -> Result<(), Error> {
+    pub(super) fn bytes(&self, range: Range<u64>, buf: &mut Vec<u8>) -> Result<(), Error> {
         buf.resize((range.end - range.start) as usize, 0);
         match &self.data {
             Data::File(file) => {
@@ -82,11 +82,11 @@ impl Source {
         Ok(if memchr::memchr(b'\\', buf).is_some() { join_lines(buf) } else { 0 })
     }
 
-    /// Parts of about `size` bytes that begin and end at line ends.
-    pub(super) fn pieces(&self, size: u64) -> Result<Vec<Range<u64>>, Error> {
-        let mut pieces = Vec::with_capacity((self.len / size + 1) as usize);
-        let (mut start, mut buf) = (0, Vec::new());
-        while start < self.len {
+    /// Parts of `range`, which begins and ends at line ends, that do so too and have about `size` bytes.
+    pub(super) fn pieces(&self, range: Range<u64>, size: u64) -> Result<Vec<Range<u64>>, Error> {
+        let mut pieces = Vec::with_capacity(((range.end - range.start) / size + 1) as usize);
+        let (mut start, mut buf) = (range.start, Vec::new());
+        while start < range.end {
             let end = self.line_start(start.saturating_add(size), &mut buf)?;
             pieces.push(start..end);
             start = end;
@@ -136,6 +136,21 @@ impl Source {
         }
         let column = row.iter().filter(|&&c| c & 0xc0 != 0x80).count() as u64 + 1;
         Ok((line, column))
+    }
+}
+
+impl Source {
+    /// Line and column, from 1, of the byte at `offset` of a text.
+    pub(super) fn line_and_column(&self, offset: u64) -> Result<(u64, u64), Error> {
+        const WINDOW: u64 = 1 << 20;
+        let (mut lines, mut row, mut buf) = (0, 0, Vec::new());
+        for start in (0..offset).step_by(WINDOW as usize) {
+            self.bytes(start..offset.min(start + WINDOW), &mut buf)?;
+            for newline in memchr_iter(b'\n', &buf) {
+                (lines, row) = (lines + 1, start + newline as u64 + 1);
+            }
+        }
+        self.place(offset, &(row..offset), lines)
     }
 }
 
@@ -209,7 +224,7 @@ mod tests {
         let text = format!("v 1\nf 1 \\\n 2 \\\r\n 3\n\n{long}\nlast");
         let source = Source::memory(Path::new("t"), text.as_bytes());
         for size in 1..60 {
-            let pieces = source.pieces(size).expect("it is in memory");
+            let pieces = source.pieces(0..source.len, size).expect("it is in memory");
             assert_eq!(pieces.first().map(|p| p.start), Some(0));
             assert_eq!(pieces.last().map(|p| p.end), Some(text.len() as u64));
             for pair in pieces.windows(2) {
