@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use std::fmt::Write as _;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use tempfile::TempDir;
@@ -20,6 +21,7 @@ fn options(allow: &[PathBuf]) -> ReadOptions<'_> {
         materials: true,
         allow,
         cancel: &GO_ON,
+        free_memory: || None,
         progress: None,
     }
 }
@@ -279,20 +281,33 @@ const MESHES: [(&str, [u64; 5]); 19] = [
     ("terrain_N44W072.obj", [1_442_401, 0, 0, 2_880_000, 2_880_000]),
 ];
 
+/// What is in a file that may be compressed.
+fn unpacked(path: &Path) -> Vec<u8> {
+    let mut bytes = std::fs::read(path).expect("it was read before");
+    if path.extension().is_some_and(|e| e == "zst") {
+        let mut decoder = ruzstd::decoding::StreamingDecoder::new(&bytes[..]).expect("it was unpacked before");
+        let mut out = Vec::new();
+        decoder.read_to_end(&mut out).expect("it was unpacked before");
+        bytes = out;
+    }
+    bytes
+}
+
 /// Runs only where the meshes are: next to the repository, or in `TISON_MESHES`.
 #[test]
 fn real_meshes_are_read_exactly() {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/meshes");
     let root = std::env::var_os("TISON_MESHES").map_or(beside, PathBuf::from);
     for (name, want) in MESHES {
-        let path = root.join(name);
+        let packed = root.join(format!("{name}.zst"));
+        let path = if packed.is_file() { packed } else { root.join(name) };
         if !path.is_file() {
             continue;
         }
         let file = load(&path).unwrap_or_else(|e| panic!("{e}"));
         let c = file.counts;
         assert_eq!([c.vertices, c.textures, c.normals, c.polygons, c.triangles], want, "{name}");
-        let text = std::fs::read(&path).expect("it was read before");
+        let text = unpacked(&path);
         let text = String::from_utf8_lossy(&text);
         let numbers = |l: &str| l.split_whitespace().skip(1).take(3).map(|x| x.parse().expect("a number")).collect();
         for (i, line) in text.lines().filter(|l| l.starts_with("v ") || l.starts_with("v\t")).enumerate() {
@@ -300,7 +315,8 @@ fn real_meshes_are_read_exactly() {
             let exact = file.frame.to_local(DVec3::from_slice(&p)).as_vec3();
             assert_eq!(Vec3::from_slice(&file.points[3 * i..]), exact, "{name}: vertex {i}");
         }
-        let (models, materials) = tobj::load_obj(&path, &FAN).expect("tobj reads it too");
+        let library = |name: &Path| tobj::load_mtl(path.with_file_name(name));
+        let (models, materials) = tobj::load_obj_buf(&mut text.as_bytes(), &FAN, library).expect("tobj reads it too");
         if c.clipped == 0 {
             compare(&file, &corners_by_tobj(&models), name);
         }

@@ -161,7 +161,8 @@ pub struct ReadingArgs {
 
 #[derive(Args, Debug)]
 pub struct RenderArgs {
-    /// Scene (.toml, .json, .ray) or mesh (.obj, .ply) to render; a mesh is framed and lit unless told otherwise
+    /// Scene (.toml, .json, .ray) or mesh (.obj, .ply, also .gz or .zst of these) to render; a mesh is framed and lit
+    /// unless told otherwise
     #[arg(value_name = "FILE", required = true)]
     pub input: Option<PathBuf>,
 

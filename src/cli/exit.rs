@@ -111,6 +111,9 @@ impl From<scene::Error> for Failure {
                 Self { help: super::message::nearest_input(&path), ..failure.because(source) }
             }
             scene::Error::Scene(list) => Self { place: Place::Scene(list), ..failure },
+            scene::Error::NoRoom { .. } => {
+                Self { exit: Exit::Limit, ..failure }.help("unpack it into a file: such files are read piece by piece")
+            }
             scene::Error::At { path, line, column, .. } => Self { place: Place::Text(path, line, column), ..failure },
             _ => failure,
         }

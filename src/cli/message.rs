@@ -10,6 +10,7 @@ use std::error::Error;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
+use tison::scene::is_packed;
 
 /// Warnings shown unless all are asked for.
 const FEW: usize = 5;
@@ -118,7 +119,7 @@ fn visible(c: char) -> char {
 
 /// Line `number` (from 1) of a file, as much of it as is sensible.
 fn source_line(path: &Path, number: u64) -> Option<String> {
-    if !path.is_file() {
+    if !path.is_file() || is_packed(path) {
         return None;
     }
     let mut reader = BufReader::with_capacity(1 << 16, File::open(path).ok()?);

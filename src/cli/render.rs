@@ -12,7 +12,7 @@ use super::report::{Report, certificate};
 use super::settings::Settings;
 use super::signals::Signals;
 use super::target::{Output, Target};
-use super::{EMBREE, VERSION, config, limits, output, turntable};
+use super::{EMBREE, VERSION, config, limits, output, system, turntable};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -373,6 +373,7 @@ pub fn load(
         allow: reading.allow.to_vec(),
         overrides: reading.defines.iter().map(|d| Override::from(d.as_str())).collect(),
         cancel: &control.cancel,
+        free_memory: system::available_memory,
         progress: Some(&report),
     };
     scene::load(path, &options)

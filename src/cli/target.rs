@@ -5,6 +5,7 @@ use super::exit::Failure;
 use super::message::nearest;
 use std::path::{Path, PathBuf};
 use tison::film::{self, Format};
+use tison::scene::unpacked_name;
 
 /// A file or stdout.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,7 +40,8 @@ pub fn outputs(args: &RenderArgs, input: &Path) -> Result<Vec<Output>, Failure> 
         return Ok(Vec::new());
     }
     let named: Vec<PathBuf> = if args.output.is_empty() {
-        let stem = input.file_stem().ok_or_else(|| {
+        let unpacked = unpacked_name(input);
+        let stem = unpacked.file_stem().ok_or_else(|| {
             Failure::usage(format!("{} names no file", input.display()))
                 .help("name a scene like scene.toml or a mesh like model.obj or model.ply")
         })?;

@@ -95,6 +95,14 @@ pub enum Error {
         /// How many would do.
         limit: u64,
     },
+    /// More in a pipe or compressed file than there is memory for.
+    #[error("{}: it does not fit into memory: more than {:.1} GB of it are read already", path.display(), *read as f64 / 1e9)]
+    NoRoom {
+        /// The file.
+        path: PathBuf,
+        /// Bytes that were read, unpacked.
+        read: u64,
+    },
     /// A scene file with mistakes in it, in the order of their places.
     #[error("{}", in_short(.0))]
     Scene(Vec<Diagnostic>),

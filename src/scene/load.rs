@@ -5,7 +5,7 @@ use super::format::{Diagnostic, Override};
 use super::freeze::{self, Assets, MeshFile, Wanted};
 use super::obj::{Reader, Uv};
 use super::texture::Encoding;
-use super::{Error, MeshFormat, MeshPaint, Object, Scene, Warning};
+use super::{Error, FreeMemory, MeshFormat, MeshPaint, Object, Scene, Warning};
 use glam::{DAffine3, Vec3};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -27,6 +27,8 @@ pub struct LoadOptions<'a> {
     pub overrides: Vec<Override>,
     /// Set by another thread to give up.
     pub cancel: &'a AtomicBool,
+    /// Asked while a pipe or a compressed mesh is read into memory.
+    pub free_memory: FreeMemory,
     /// Told bytes read and bytes in all, from any thread.
     pub progress: Option<&'a (dyn Fn(u64, u64) + Sync)>,
 }
@@ -42,6 +44,7 @@ impl<'a> LoadOptions<'a> {
             allow: Vec::new(),
             overrides: Vec::new(),
             cancel,
+            free_memory: || None,
             progress: None,
         }
     }

@@ -35,6 +35,7 @@ pub use material::{Material, Reflect, Textured};
 pub use mesh_format::{MeshFormat, read_mesh};
 pub use needs::Needs;
 pub use object::{AnyShapes, Instance, Mesh, MeshData, MeshPaint, Object, Shapes};
+pub use source::{FreeMemory, is_packed, unpacked_name};
 pub use texture::{Encoding, Texture};
 
 use crate::geom::{Bounds, ShapeSet};

@@ -4,8 +4,8 @@
 //! Polygons are split by the same code from the corners that each of them read: equal triangles are equal
 //! polygons.
 
-use crate::scene::Error;
 use crate::scene::obj::{self, CornerData, ObjFile, ReadOptions, Reader, Uv};
+use crate::scene::{Error, FreeMemory};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -40,11 +40,17 @@ pub struct Difference {
 }
 
 /// Reads the OBJ file at `path` with both readers and compares what they make of it. `allow` has the folders, besides
-/// the file's own, that its libraries may be in.
+/// the file's own, that its libraries may be in; `free_memory` is
+/// asked if it is compressed.
 ///
 /// # Errors
 /// What our own reader says of a file that it cannot read; what stops both.
-pub fn compare(path: &Path, allow: &[PathBuf], cancel: &AtomicBool) -> Result<Compared, Error> {
+pub fn compare(
+    path: &Path,
+    allow: &[PathBuf],
+    cancel: &AtomicBool,
+    free_memory: FreeMemory,
+) -> Result<Compared, Error> {
     let options = |reader| ReadOptions {
         reader,
         normals: true,
@@ -53,6 +59,7 @@ pub fn compare(path: &Path, allow: &[PathBuf], cancel: &AtomicBool) -> Result<Co
         rests: false,
         allow,
         cancel,
+        free_memory,
         progress: None,
     };
     let own = obj::read(path, &options(Reader::Own))?;

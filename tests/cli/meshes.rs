@@ -1,7 +1,8 @@
-//! Meshes in other formats than OBJ.
+//! Meshes in other formats than OBJ, and compressed ones.
 
 use super::{Bench, TETRAHEDRON, decode_file, text};
 use serde_json::Value;
+use std::io::Write;
 use std::process::Output;
 
 /// The header of a PLY file with what OBJ text has, which must be `v` and `f` lines.
@@ -97,6 +98,64 @@ fn ply_in_every_encoding_gives_the_picture_of_the_obj() {
     bench.expect("s.toml --backend native --size 20x15 -q", 0);
     let out = bench.expect("verify --readers little.ply", 0);
     assert!(text(&out.stdout).contains("no OBJ file"), "{}", text(&out.stdout));
+}
+
+fn gzip(bytes: impl AsRef<[u8]>) -> Vec<u8> {
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    encoder.write_all(bytes.as_ref()).expect("memory takes all");
+    encoder.finish().expect("memory takes all")
+}
+
+fn zstd(bytes: impl AsRef<[u8]>) -> Vec<u8> {
+    ruzstd::encoding::compress_to_vec(bytes.as_ref(), ruzstd::encoding::CompressionLevel::Fastest)
+}
+
+#[test]
+fn compressed_meshes_give_the_picture_of_the_obj() {
+    let bench = Bench::new();
+    let red = format!("mtllib m.mtl\nusemtl red\n{}", bowl());
+    bench.write("m.mtl", "newmtl red\nKd 0.9 0.1 0.1\n");
+    bench.write("bowl.obj", &red);
+    bench.write("a.obj.gz", gzip(&red));
+    bench.write("b.obj.zst", zstd(&red));
+    bench.write("plain.obj", bowl());
+    bench.write("c.ply.gz", gzip(ascii(&bowl())));
+    bench.write("d.ply.zst", zstd(binary(&bowl(), true)));
+    bench.write("s.toml", "tison = 1\n[[object]]\nmesh = \"b.obj.zst\"\n[light.a]\nposition = [2, 3, 9]\n");
+    for (want, names) in [("bowl.obj", ["a.obj.gz", "b.obj.zst"]), ("plain.obj", ["c.ply.gz", "d.ply.zst"])] {
+        bench.expect(&format!("{want} --backend native --size 80x60 -q -o want.png"), 0);
+        for name in names {
+            bench.expect(&format!("{name} --backend native --size 80x60 -q"), 0);
+            // Named after the mesh, without both extensions.
+            let picture = format!("{}.png", &name[..1]);
+            assert!(decode_file(&bench.path("want.png")) == decode_file(&bench.path(&picture)), "{name}");
+        }
+    }
+    let told = json(&bench.expect("info --json s.toml", 0));
+    assert_eq!((&told["scene"]["triangles"], &told["materials"][0]["name"]), (&Value::from(245), &Value::from("red")));
+    bench.expect("check b.obj.zst --obj-reader tobj", 0);
+    let told = json(&bench.expect("verify --readers --json s.toml", 0));
+    assert_eq!(told["readers"][0]["triangles"], 245);
+    let out = bench.command("info --json /dev/stdin").write_stdin(zstd(ascii(&bowl()))).output().expect("it runs");
+    assert_eq!(json(&out)["scene"]["triangles"], 245, "{}", text(&out.stderr));
+}
+
+#[test]
+fn what_is_wrong_with_a_compressed_mesh_is_told() {
+    let bench = Bench::new();
+    bench.write("index.obj.gz", gzip(TETRAHEDRON.replace("f 1 3 2", "f 1 3 9")));
+    bench.write("cut.obj.zst", &zstd(TETRAHEDRON)[..30]);
+    bench.write("plain.ply.gz", ascii(TETRAHEDRON));
+    for (name, want) in [
+        ("index.obj.gz", "index.obj.gz:5:7: vertex index 9 does not exist: the file has 4 'v' lines\n"),
+        ("cut.obj.zst", "cut.obj.zst: it cannot be unpacked: "),
+        ("plain.ply.gz", "plain.ply.gz: it is not compressed by gzip, as its name says"),
+    ] {
+        let out = bench.expect(&format!("{name} -o out.png"), 3);
+        assert!(text(&out.stderr).contains(want), "{}", text(&out.stderr));
+        // The line would be one of compressed bytes.
+        assert!(!text(&out.stderr).contains(" | "), "{}", text(&out.stderr));
+    }
 }
 
 #[test]

@@ -10,7 +10,7 @@ fn compared(text: impl AsRef<[u8]>) -> Result<Compared, Error> {
     let dir = tempfile::tempdir().expect("a temporary folder");
     let path = dir.path().join("a.obj");
     std::fs::write(&path, text).expect("it can be written");
-    compare(&path, &[], &GO_ON)
+    compare(&path, &[], &GO_ON, || None)
 }
 
 #[track_caller]

@@ -15,7 +15,7 @@ use super::render::Reading;
 use super::settings::SIZE;
 use super::signals::Signals;
 use super::target::Target;
-use super::{limits, output, parse, render};
+use super::{limits, output, parse, render, system};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -165,7 +165,8 @@ impl<'a> Run<'a, '_> {
         // A pipe is empty by now.
         let meshes = loaded.files.iter().filter(is_obj).filter(|path| path.is_file());
         let compare = |path: &PathBuf| {
-            readers::compare(path, &self.args.reading.allow_path, &self.control.cancel).map_err(Failure::from)
+            let (allow, cancel) = (&self.args.reading.allow_path, &self.control.cancel);
+            readers::compare(path, allow, cancel, system::available_memory).map_err(Failure::from)
         };
         meshes.map(compare).collect()
     }

@@ -47,6 +47,7 @@ impl MeshFile {
             rests: assets.options.exact,
             allow: &assets.options.allow,
             cancel: assets.options.cancel,
+            free_memory: assets.options.free_memory,
             progress,
         };
         let file = read_mesh(path, &read)?;

@@ -106,8 +106,10 @@ fn read_meshes(sources: &[Source], assets: &mut Assets<'_>) -> Result<Vec<MeshFi
     let (mut before, total) = (0, sizes.iter().sum());
     let read = |(source, size): (&Source, u64)| {
         let tell = assets.options.progress;
-        let of_all = |done: u64, _| {
+        // What a compressed file holds is larger than the file.
+        let of_all = |done: u64, all: u64| {
             if let Some(tell) = tell {
+                let done = (done as f64 / all.max(1) as f64 * size as f64) as u64;
                 tell((before + done).min(total), total);
             }
         };

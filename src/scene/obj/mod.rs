@@ -30,7 +30,7 @@ pub use corners::CornerData;
 pub use mtl::MtlMaterial;
 pub(super) use notes::with_more;
 
-use super::source::Source;
+use super::source::{FreeMemory, Limits, Source};
 use super::{Error, Warning};
 use crate::math::Frame;
 use std::path::{Path, PathBuf};
@@ -77,6 +77,8 @@ pub struct ReadOptions<'a> {
     pub allow: &'a [PathBuf],
     /// Reading stops soon after this becomes true.
     pub cancel: &'a AtomicBool,
+    /// Asked while a pipe or a compressed file is read into memory.
+    pub free_memory: FreeMemory,
     /// Told how many bytes are done, of how many, from any thread and not in order. As
     /// the file is gone over twice, that is twice its size.
     pub progress: Option<&'a (dyn Fn(u64, u64) + Sync)>,
@@ -94,6 +96,11 @@ pub enum Uv {
 }
 
 impl ReadOptions<'_> {
+    /// What holds for all that is read into memory.
+    pub(super) fn limits(&self) -> Limits<'_> {
+        Limits { cancel: self.cancel, free_memory: self.free_memory }
+    }
+
     /// Whether texture coordinates are wanted on faces that have `materials`.
     pub(super) fn wants_uv(&self, materials: &[MtlMaterial]) -> bool {
         match self.uv {
@@ -176,10 +183,11 @@ pub struct Counts {
 /// [`Error::Read`] and [`Error::NotAFile`] for what is no readable file, [`Error::At`] for
 /// the first line that cannot be understood, [`Error::NoFaces`] for a file with nothing to
 /// render, [`Error::Forbidden`] for a library or image outside the allowed folders,
-/// [`Error::TooMany`] beyond what 32-bit indices can count, [`Error::Cancelled`];
+/// [`Error::TooMany`] beyond what 32-bit indices can count, [`Error::Broken`] and [`Error::NoRoom`] for what
+/// cannot be unpacked, [`Error::Cancelled`];
 /// [`Error::SecondReader`] for what tobj cannot read, if it is asked.
 pub fn read(path: &Path, options: &ReadOptions<'_>) -> Result<ObjFile, Error> {
-    read_source(&Source::open(path, options.cancel)?, options)
+    read_source(&Source::open(path, options.limits())?, options)
 }
 
 /// The same for a file that is open.
@@ -196,7 +204,7 @@ pub(super) fn read_source(source: &Source, options: &ReadOptions<'_>) -> Result<
 /// # Errors
 /// As [`read`].
 pub fn line_of_triangle(path: &Path, triangle: u64, options: &ReadOptions<'_>) -> Result<Option<u64>, Error> {
-    read::line_of_triangle(&Source::open(path, options.cancel)?, triangle, options, PIECE)
+    read::line_of_triangle(&Source::open(path, options.limits())?, triangle, options, PIECE)
 }
 
 /// Bytes of a piece: small enough for a second-level cache, large enough to make each piece's own cost vanish.

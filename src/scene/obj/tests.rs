@@ -18,6 +18,7 @@ fn options() -> ReadOptions<'static> {
         materials: true,
         allow: &[],
         cancel: &GO_ON,
+        free_memory: || None,
         progress: None,
     }
 }

@@ -19,6 +19,7 @@ fn options() -> ReadOptions<'static> {
         materials: true,
         allow: &[],
         cancel: &GO_ON,
+        free_memory: || None,
         progress: None,
     }
 }

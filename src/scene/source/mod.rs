@@ -1,12 +1,28 @@
 //! The bytes of a file, read piece by piece, and the places where it can be cut.
 
+mod packed;
+
+pub use packed::{is_packed, unpacked_name};
+
 use super::Error;
 use memchr::memchr_iter;
 use std::fs::File;
 use std::io::{self, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
+
+/// What reading files into memory must heed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits<'a> {
+    /// Reading stops soon after this becomes true.
+    pub(super) cancel: &'a AtomicBool,
+    pub(super) free_memory: FreeMemory,
+}
+
+/// Tells how many bytes of memory can still be had; nothing where nobody knows. Asked again and again while a pipe
+/// or a compressed file is read into memory, which ends in an error when they are too few.
+pub type FreeMemory = fn() -> Option<u64>;
 
 /// A file that any thread may read a part of.
 #[derive(Debug)]
@@ -19,7 +35,7 @@ pub(super) struct Source {
 #[derive(Debug)]
 enum Data {
     File(File),
-    /// What a pipe gave: it cannot be read twice.
+    /// What a pipe gave, which cannot be read twice, or what a compressed file holds.
     Memory(Vec<u8>),
 }
 
@@ -27,22 +43,23 @@ enum Data {
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 impl Source {
-    pub(super) fn open(path: &Path, cancel: &AtomicBool) -> Result<Self, Error> {
+    /// Opens a file. What is compressed is unpacked into memory.
+    pub(super) fn open(path: &Path, limits: Limits<'_>) -> Result<Self, Error> {
         let failed = |source| Error::Read { path: path.to_owned(), source };
         let meta = std::fs::metadata(path).map_err(failed)?;
         if meta.is_dir() {
             return Err(Error::NotAFile { path: path.to_owned() });
         }
         let mut file = File::open(path).map_err(failed)?;
-        if meta.is_file() {
-            return Ok(Self { path: path.to_owned(), len: meta.len(), data: Data::File(file) });
-        }
-        let mut bytes = Vec::new();
-        while (&mut file).take(1 << 20).read_to_end(&mut bytes).map_err(failed)? > 0 {
-            if cancel.load(Ordering::Relaxed) {
-                return Err(Error::Cancelled);
+        let mut head = Vec::new();
+        (&mut file).take(packed::HEAD as u64).read_to_end(&mut head).map_err(failed)?;
+        let bytes = match packed::packing(path, &head)? {
+            None if meta.is_file() => {
+                return Ok(Self { path: path.to_owned(), len: meta.len(), data: Data::File(file) });
             }
-        }
+            None => packed::read_all(head.as_slice().chain(file), path, limits)?,
+            Some(packing) => packed::unpack(head.as_slice().chain(file), packing, path, limits)?,
+        };
         Ok(Self { path: path.to_owned(), len: bytes.len() as u64, data: Data::Memory(bytes) })
     }
 
