@@ -271,8 +271,8 @@ th:first-child, td:first-child { text-align: left; }
 .plots svg { max-width: 100%; height: auto; }
 .pictures { display: flex; flex-wrap: wrap; gap: 12px; margin: 1em 0; }
 .pictures img { image-rendering: pixelated; margin-right: 4px; }
-figure { margin: 0; }
-figcaption { font-size: 13px; }
+figure { margin: 0; width: min-content; white-space: nowrap; }
+figcaption { font-size: 13px; white-space: normal; }
 .table { overflow-x: auto; }
 @media (prefers-color-scheme: dark) { body { color: #ddd; background: #181818; } }
 </style>

@@ -14,7 +14,8 @@ use serde_json::{Value, json};
 /// What is measured, and how.
 pub const ABOUT: &str = "Small pictures with more and more samples, against a reference with many. Errors are of linear \
     light; seconds are those of the render loop on all threads, medians over the seeds like every other figure. Pixels \
-    are averaged over their square (a box filter).";
+    are averaged over their square (a box filter). The last part is about single rays: what is wrong with the numbers, over \
+    the time that a ray takes.";
 
 /// RMSE that everybody is to reach.
 const LEVELS: [f64; 3] = [1e-2, 3e-3, 1e-3];
@@ -135,7 +136,7 @@ fn about(subject: &Subject, reference: &Reference) -> String {
     let job = &subject.job;
     let (width, height) = job.size;
     format!(
-        "{width}x{height} pixels, {} bounces. The reference: {BLOCKS} blocks of {} samples a pixel with seeds of their own, by \
+        "{width}x{height} pixels, rays bounce {} times at most. The reference: {BLOCKS} blocks of {} samples a pixel with seeds of their own, by \
          the native backend in f64, the whole tree of rays, no adaptivity, added up in f64. Its own RMSE, from the spread \
          between the blocks, is {:.2e}. The RMSE of the table are without it (the root of the difference of the squares); \
          where less than that noise is left it is in brackets, and plots and slopes end before it. The other figures are \
@@ -290,4 +291,39 @@ fn samples(n: f64) -> String {
 /// With a sign, for slopes.
 fn signed(x: f64) -> String {
     format!("{x:+.2}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::candidates;
+    use super::*;
+
+    #[test]
+    fn what_is_lost_in_the_noise_and_all_after_it_is_not_fitted() {
+        let point = |spp: f64, is_lost| Point {
+            spp,
+            seconds: 1e-3 * spp,
+            rmse_measured: 1.0 / spp,
+            rmse: 1.0 / spp,
+            is_lost,
+            rmse_smooth: f64::NAN,
+            smooth_is_lost: false,
+            relmse: 0.0,
+            relmse_trimmed: 0.0,
+            smape: 0.0,
+            max: 0.0,
+            beyond_1_255: 0.0,
+            flip: 0.0,
+            ssim: f64::NAN,
+        };
+        let points = [(1.0, false), (4.0, false), (16.0, true), (64.0, false)].map(|(spp, lost)| point(spp, lost));
+        let candidate = candidates::all(&Options::quick(vec![])).swap_remove(0);
+        let curve = Curve { candidate, points: points.to_vec() };
+        assert_eq!(by_samples(&curve), [(1.0, 1.0), (4.0, 0.25)]);
+        assert_eq!(by_seconds(&curve), [(1e-3, 1.0), (4e-3, 0.25)]);
+        assert_eq!(smooth_by_samples(&curve), [], "there are no smooth pixels");
+        assert!(line(&curve, by_samples(&curve)).name.ends_with("  -1.00"));
+        assert_eq!(row("a", &points[2])[3..5], ["(6.25e-2)".to_owned(), "-".to_owned()]);
+        assert!((points[0].efficiency() - 1e3).abs() < 1e-9);
+    }
 }
