@@ -6,7 +6,8 @@ use super::frame::Frame;
 use super::plan::{Input, Plan};
 use std::fmt;
 use tison::film::{Display, Tonemap};
-use tison::render::Job;
+use tison::math::Sampler;
+use tison::render::{Job, Stop};
 use tison::scene::desc::{LensSampler, RenderDesc};
 
 /// Who says what a setting is.
@@ -60,6 +61,8 @@ pub const SIZE: (u64, u64) = (1280, 720);
 const RECURSION: u32 = 8;
 const SPP_OF_A_MESH: u32 = 1;
 const SPP_OF_A_SCENE: u32 = 16;
+/// Samples that a pixel gets at most where something else says when it is enough.
+const MOST_SPP: u32 = 1 << 16;
 const MIN_WEIGHT: f32 = 1.0 / 1024.0;
 /// The whole pixel.
 const JITTER_RADIUS: f64 = 0.5;
@@ -76,7 +79,11 @@ impl Settings {
             Input::Mesh => SPP_OF_A_MESH,
             Input::Scene => SPP_OF_A_SCENE,
         };
-        let spp = all.choose("spp", "render.samples", flags.spp, render.samples, spp);
+        let spp = match flags.stops_by_itself() {
+            true => all.choose("spp", "render.samples", flags.spp, None, MOST_SPP),
+            false => all.choose("spp", "render.samples", flags.spp, render.samples, spp),
+        };
+        let stop = all.stop(flags);
         let k_max = all.choose("recursion", "render.recursion", flags.recursion, render.recursion, RECURSION);
         let min_weight = all.choose("min-weight", "render.min_weight", flags.min_weight, render.min_weight, MIN_WEIGHT);
         let seed = all.choose("seed", "render.seed", flags.seed, render.seed, 0);
@@ -85,18 +92,27 @@ impl Settings {
         let course = render.course_rules;
         let light_samples = render.samples.filter(|_| course);
         let light_samples = all.choose("light-samples", "render.samples", flags.light_samples, light_samples, 1);
-        let lens_sampler = all.lens_sampler(flags, render);
+        let sampler = (flags.sampler, render.sampler);
+        let sampler = all.by_name("sampler", "render.sampler", sampler, Sampler::default(), Sampler::name);
+        let lens_sampler = (flags.lens_sampler, render.lens_sampler);
+        let lens_sampler =
+            all.by_name("lens-sampler", "render.lens_sampler", lens_sampler, LensSampler::default(), LensSampler::name);
         let tonemap = all.tonemap(flags, course);
         let exposure = all.choose("exposure", "", flags.exposure, None, 0.0);
         all.switch("centre", flags.centre);
+        all.switch("no-error-estimate", flags.no_error_estimate);
         let job = Job {
             size: frame.size,
             crop: frame.crop,
             spp,
+            stop,
+            time_limit: flags.time_limit,
+            estimate: spp > 1 && !flags.no_error_estimate,
             seed,
             k_max,
             min_weight,
             centre: flags.centre,
+            sampler,
             lens_sampler,
             jitter_radius,
             light_samples,
@@ -115,6 +131,15 @@ impl Settings {
                 None => format!("--centre is for one sample a pixel, but there are {}; add --spp 1", self.job.spp),
             };
             return Err(Failure::usage(what).help("several samples are spread over the pixel in any case"));
+        }
+        if matches!(self.job.stop, Stop::Noise(_)) && self.job.spp <= Job::FIRST_SPP {
+            let (first, spp) = (Job::FIRST_SPP, self.job.spp);
+            let what = format!("--adaptive changes nothing: {first} samples come first, and --spp is {spp}");
+            return Err(Failure::usage(what).help("name the most that a pixel may get, like --spp 256"));
+        }
+        if self.job.sampler == Sampler::Stratified && self.job.is_adaptive() {
+            let what = "the sampler stratified has to know the number of samples, which is to be found here";
+            return Err(Failure::usage(what).help("use --sampler sobol or random, or a plain --spp"));
         }
         if flags.exposure.is_some() && self.display.tonemap == Tonemap::Stretch {
             return Err(Failure::usage("--exposure changes nothing where the image is stretched to its own range")
@@ -159,31 +184,38 @@ impl Choices<'_> {
         value
     }
 
-    fn lens_sampler(&mut self, flags: &PictureArgs, render: &RenderDesc) -> LensSampler {
-        let (flag, scene) = (flags.lens_sampler, render.lens_sampler);
-        let text = LensSampler::name;
-        self.choose(
-            "lens-sampler",
-            "render.lens_sampler",
-            flag.map(text),
-            scene.map(text),
-            text(LensSampler::default()),
-        );
-        flag.or(scene).unwrap_or_default()
+    /// When pixels have enough samples.
+    fn stop(&mut self, flags: &PictureArgs) -> Stop {
+        let given = |name, value: Option<f64>| {
+            value.map(|value| Setting { name, value: value.to_string(), origin: Origin::Flag })
+        };
+        self.list.extend(given("adaptive", flags.adaptive));
+        self.list.extend(given("target-error", flags.target_error));
+        self.list.extend(given("time-limit", flags.time_limit.map(|limit| limit.as_secs_f64())));
+        match (flags.adaptive, flags.target_error) {
+            (Some(threshold), _) => Stop::Noise(threshold),
+            (None, Some(target)) => Stop::Rmse(target),
+            (None, None) => Stop::Count,
+        }
+    }
+
+    /// A choice that is shown by its name; `said` is what the flag and the scene say.
+    fn by_name<T: Copy>(
+        &mut self,
+        name: &'static str,
+        key: &str,
+        said: (Option<T>, Option<T>),
+        default: T,
+        text: fn(T) -> &'static str,
+    ) -> T {
+        self.choose(name, key, said.0.map(text), said.1.map(text), text(default));
+        said.0.or(said.1).unwrap_or(default)
     }
 
     /// Course scenes are shown as the course's program shows them.
     fn tonemap(&mut self, flags: &PictureArgs, course: bool) -> Tonemap {
-        let scene = course.then_some(Tonemap::Stretch);
-        let text = Tonemap::name;
-        self.choose(
-            "tonemap",
-            "render.course_rules",
-            flags.tonemap.map(text),
-            scene.map(text),
-            text(Tonemap::default()),
-        );
-        flags.tonemap.or(scene).unwrap_or_default()
+        let said = (flags.tonemap, course.then_some(Tonemap::Stretch));
+        self.by_name("tonemap", "render.course_rules", said, Tonemap::default(), Tonemap::name)
     }
 
     fn switch(&mut self, name: &'static str, given: bool) {

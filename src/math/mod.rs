@@ -10,4 +10,7 @@ mod sampling;
 pub use frame::Frame;
 pub use pow::pow01;
 pub use random::Random;
-pub use sampling::{Branch, PixelSamples, concentric_disc, polar_disc, rejection_disc, uniform_radius_disc};
+pub(crate) use sampling::hash;
+pub use sampling::{
+    Branch, PixelSamples, Sampler, Sampling, concentric_disc, polar_disc, rejection_disc, uniform_radius_disc,
+};

@@ -1,68 +1,168 @@
 //! Sample points: where in the pixel, on the lens and on a light.
 
+mod strata;
+
 use glam::DVec2;
+use strata::Strata;
 
 /// Points of one index block of the Sobol sequence; beyond it a new scramble begins.
 const BLOCK: u32 = 1 << 16;
 
+/// How sample points are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sampler {
+    /// Owen-scrambled Sobol points: pixel, lens and lights are spread over together. Any count works; powers of two are
+    /// better.
+    ///
+    /// Source: B. Burley, "Practical Hash-based Owen Scrambling", JCGT 10(4), 2020.
+    #[default]
+    Sobol,
+    /// Independent uniform numbers of 32 bits: the error falls with the square root of the count, whatever is seen.
+    Random,
+    /// One jittered point in each of as many cells as there are samples, for pixel, lens and each light apart; which
+    /// point of the one goes with which of the other is left to chance. Only a whole set is stratified, so the count
+    /// has to be known before.
+    ///
+    /// Source: A. Kensler, "Correlated Multi-Jittered Sampling", Pixar Technical Memo 13-01, 2013.
+    Stratified,
+}
+
+impl Sampler {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Sobol, Self::Random, Self::Stratified];
+
+    /// The name in scene files and on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sobol => "sobol",
+            Self::Random => "random",
+            Self::Stratified => "stratified",
+        }
+    }
+}
+
+/// The sample points of a picture: what those of all its pixels have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct Sampling {
+    sampler: Sampler,
+    /// Hash of the seed.
+    seed: u32,
+    /// Cells of the pixel, and of the lens.
+    in_pixel: Strata,
+    /// Cells of a light.
+    at_light: Strata,
+}
+
+impl Sampling {
+    /// Of `spp` samples a pixel, each of which looks `light_samples` times at a light.
+    #[must_use]
+    pub fn new(sampler: Sampler, seed: u32, spp: u32, light_samples: u32) -> Self {
+        let (in_pixel, at_light) = (Strata::new(spp), Strata::new(spp.saturating_mul(light_samples)));
+        Self { sampler, seed: hash(seed), in_pixel, at_light }
+    }
+
+    /// The same kind of points, scrambled or drawn independently.
+    #[must_use]
+    pub fn with_seed(self, seed: u32) -> Self {
+        Self { seed: hash(seed), ..self }
+    }
+
+    /// The points of pixel `(x, y)`.
+    #[inline]
+    #[must_use]
+    pub fn pixel(&self, x: u32, y: u32) -> PixelSamples<'_> {
+        PixelSamples { sampling: self, seed: hash(x ^ hash(y ^ self.seed)) }
+    }
+}
+
 /// The sample points of one pixel: dimensions 0, 1 for the pixel, 2, 3 for the lens, then two
 /// for each light that has a size.
 ///
-/// Owen-scrambled Sobol points, a function of (pixel, sample, seed) alone, so that any
-/// thread may draw any of them. Any count works; powers of two are better.
-///
-/// Source: B. Burley, "Practical Hash-based Owen Scrambling", JCGT 10(4), 2020.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct PixelSamples {
+/// They are a function of (pixel, sample, seed) and the kind of [`Sampling`] alone, so that any thread may draw any
+/// of them.
+#[derive(Clone, Copy, Debug)]
+pub struct PixelSamples<'a> {
+    sampling: &'a Sampling,
     seed: u32,
 }
 
-impl PixelSamples {
-    /// The points of pixel `(x, y)`.
-    #[must_use]
-    pub fn new(x: u32, y: u32, seed: u32) -> Self {
-        Self { seed: hash(x ^ hash(y ^ hash(seed))) }
-    }
-
+impl PixelSamples<'_> {
     /// Point `index`, each coordinate in `[0, 1)`.
     #[inline]
     #[must_use]
-    pub fn point(self, index: u32) -> [f32; 4] {
-        self.dimensions(0, index)
+    pub fn point(self, index: u32) -> [f64; 4] {
+        match self.sampling.sampler {
+            Sampler::Sobol => sobol(0, index, self.seed),
+            Sampler::Random => join([0, 1].map(|pair| random(self.seed, index, pair))),
+            Sampler::Stratified => {
+                join([0, LENS].map(|pair| self.sampling.in_pixel.point(index, hash(self.seed ^ pair))))
+            }
+        }
     }
 
     /// Where on light number `light` sample `index` looks from a hit at the end of `branch`, in
-    /// `[0, 1)` squared.
+    /// `[0, 1)` squared. With more than one look a sample, `index` counts looks.
     ///
-    /// The camera ray's own hit takes further dimensions of the pixel's sequence, so that pixel,
+    /// Sobol: the camera ray's own hit takes further dimensions of the pixel's sequence, so that pixel,
     /// lens and light are spread together; hits after a bounce take sequences of their own.
     #[must_use]
     pub fn on_light(self, index: u32, light: u32, branch: Branch) -> [f64; 2] {
-        let (set, half) = (1 + light / 2, 2 * (light % 2) as usize);
-        let [a, b] = if branch == Branch::CAMERA && set < sobol_burley::NUM_DIMENSION_SETS_4D {
-            let point = self.dimensions(set, index);
-            [point[half], point[half + 1]]
-        } else {
-            let seed = hash(self.seed ^ hash(branch.0 ^ hash(light + 1)));
-            let point = Self { seed }.dimensions(0, index);
-            [point[0], point[1]]
-        };
-        [f64::from(a), f64::from(b)]
+        let own_seed = || hash(self.seed ^ hash(branch.0 ^ hash(light + 1)));
+        match self.sampling.sampler {
+            Sampler::Sobol => {
+                let (set, half) = (1 + light / 2, 2 * (light % 2) as usize);
+                if branch == Branch::CAMERA && set < sobol_burley::NUM_DIMENSION_SETS_4D {
+                    let point = sobol(set, index, self.seed);
+                    [point[half], point[half + 1]]
+                } else {
+                    let [a, b, ..] = sobol(0, index, own_seed());
+                    [a, b]
+                }
+            }
+            Sampler::Random => random(own_seed(), index, 2),
+            Sampler::Stratified => self.sampling.at_light.point(index, own_seed()),
+        }
     }
 
     /// Draw number `number` of sample `index` beyond its point: independent, in `[0, 1)` squared.
     #[must_use]
     pub fn beyond(self, index: u32, number: u32) -> [f64; 2] {
         let first = hash(self.seed ^ hash(index ^ hash(number.wrapping_add(0x9e37_79b9))));
-        [first, hash(first ^ 0x85eb_ca6b)].map(|bits| f64::from(bits) / 4_294_967_296.0)
+        [first, hash(first ^ 0x85eb_ca6b)].map(unit)
     }
+}
 
-    #[inline]
-    fn dimensions(self, set: u32, index: u32) -> [f32; 4] {
-        let block = index / BLOCK;
-        let seed = if block == 0 { self.seed } else { hash(self.seed ^ hash(block)) };
-        sobol_burley::sample_4d(index % BLOCK, set, seed)
-    }
+/// Tells the lens from the pixel.
+const LENS: u32 = 0x68e3_1da4;
+
+/// Four dimensions of the Sobol sequence, scrambled by `seed`.
+#[inline]
+fn sobol(set: u32, index: u32, seed: u32) -> [f64; 4] {
+    let block = index / BLOCK;
+    let seed = if block == 0 { seed } else { hash(seed ^ hash(block)) };
+    sobol_burley::sample_4d(index % BLOCK, set, seed).map(f64::from)
+}
+
+/// Two numbers that depend on nothing but what is given: the counter-based use of splitmix64.
+///
+/// Source: G. L. Steele, D. Lea, C. H. Flood, "Fast Splittable Pseudorandom Number Generators", OOPSLA 2014.
+#[inline]
+fn random(seed: u32, index: u32, pair: u32) -> [f64; 2] {
+    let start = mix(u64::from(seed) << 32 | u64::from(index));
+    let bits = mix(start.wrapping_add(u64::from(pair + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15)));
+    [(bits >> 32) as u32, bits as u32].map(unit)
+}
+
+/// 32 bits as a number in `[0, 1)`.
+#[inline]
+fn unit(bits: u32) -> f64 {
+    f64::from(bits) / 4_294_967_296.0
+}
+
+#[inline]
+fn join([[a, b], [c, d]]: [[f64; 2]; 2]) -> [f64; 4] {
+    [a, b, c, d]
 }
 
 /// Which of a sample's paths a ray is on: a hash of the bounces so far.
@@ -83,12 +183,20 @@ impl Branch {
 
 /// A bijective 32-bit hash ("lowbias32" of C. Wellons' hash prospector).
 #[must_use]
-fn hash(mut x: u32) -> u32 {
+pub fn hash(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7feb_352d);
     x ^= x >> 15;
     x = x.wrapping_mul(0x846c_a68b);
     x ^ (x >> 16)
+}
+
+/// Splitmix64's finaliser, a bijection: every bit in changes every bit out half of the time.
+#[must_use]
+fn mix(mut z: u64) -> u64 {
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
 }
 
 /// Uniform point of the unit disc from a uniform point of the unit square.
@@ -137,93 +245,4 @@ pub fn rejection_disc(first: [f64; 2], mut more: impl FnMut() -> [f64; 2]) -> DV
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_sampler_but_the_biased_one_covers_the_disc_uniformly() {
-        let samples = PixelSamples::new(3, 4, 5);
-        let n = 1 << 14;
-        let within_half = |draw: &dyn Fn(u32, f64, f64) -> DVec2| {
-            let points = (0..n).map(|i| {
-                let [_, _, u, v] = samples.point(i).map(f64::from);
-                draw(i, u, v)
-            });
-            let points: Vec<DVec2> = points.collect();
-            let mean = points.iter().sum::<DVec2>() / f64::from(n);
-            assert!(mean.length() < 5e-3 && points.iter().all(|p| p.length() <= 1.0), "{mean}");
-            points.iter().filter(|p| p.length() < 0.5).count() as f64 / f64::from(n)
-        };
-        let rejection = |i, u, v| {
-            let mut number = 0;
-            rejection_disc([u, v], || {
-                number += 1;
-                samples.beyond(i, number)
-            })
-        };
-        for (name, share, tolerance) in [
-            ("concentric", within_half(&|_, u, v| concentric_disc(u, v)), 2e-3),
-            ("polar", within_half(&|_, u, v| polar_disc(u, v)), 2e-3),
-            ("rejection", within_half(&rejection), 1e-2),
-        ] {
-            assert!((share - 0.25).abs() < tolerance, "{name}: {share} of the points in a quarter of the area");
-        }
-        let biased = within_half(&|_, u, v| uniform_radius_disc(u, v));
-        assert!((biased - 0.5).abs() < 2e-3, "{biased}");
-    }
-
-    #[test]
-    fn points_on_lights_are_stratified_and_differ_by_light_and_branch() {
-        let samples = PixelSamples::new(8, 1, 2);
-        let bounced = Branch::CAMERA.bounced(0);
-        assert_ne!(bounced, Branch::CAMERA.bounced(1));
-        assert_ne!(bounced.bounced(1), Branch::CAMERA.bounced(1).bounced(0));
-        for (light, branch) in [(0, Branch::CAMERA), (3, Branch::CAMERA), (200, Branch::CAMERA), (0, bounced)] {
-            let points: Vec<_> = (0..16).map(|i| samples.on_light(i, light, branch)).collect();
-            for dim in 0..2 {
-                let mut strata: Vec<u32> = points.iter().map(|p| (p[dim] * 16.0) as u32).collect();
-                strata.sort_unstable();
-                assert_eq!(strata, (0..16).collect::<Vec<_>>(), "light {light}, {branch:?}");
-            }
-            assert_ne!(points[0], samples.on_light(0, light + 1, branch));
-            assert_ne!(points[0], samples.on_light(0, light, branch.bounced(1)));
-        }
-    }
-
-    #[test]
-    fn the_disc_is_covered_uniformly() {
-        let n = 512;
-        let points = (0..n * n).map(|i| {
-            let (u, v) = ((i % n) as f64 + 0.5, (i / n) as f64 + 0.5);
-            concentric_disc(u / n as f64, v / n as f64)
-        });
-        let (mut inner, mut mean, mut worst) = (0, DVec2::ZERO, 0f64);
-        for p in points {
-            inner += usize::from(p.length() < 0.5);
-            mean += p;
-            worst = worst.max(p.length());
-        }
-        let total = (n * n) as f64;
-        assert!((inner as f64 / total - 0.25).abs() < 1e-3, "a quarter of the area lies within half the radius");
-        assert!(mean.length() / total < 1e-12 && worst <= 1.0 + 1e-12);
-    }
-
-    #[test]
-    fn each_block_of_sixteen_is_stratified_in_every_dimension() {
-        for pixel in 0..50 {
-            let samples = PixelSamples::new(pixel, 3 * pixel + 1, 7);
-            for dim in 0..4 {
-                let mut strata: Vec<u32> = (0..16).map(|i| (samples.point(i)[dim] * 16.0) as u32).collect();
-                strata.sort_unstable();
-                assert_eq!(strata, (0..16).collect::<Vec<_>>(), "pixel {pixel}, dimension {dim}");
-            }
-        }
-    }
-
-    #[test]
-    fn samples_past_the_first_block_are_new() {
-        let samples = PixelSamples::new(5, 6, 0);
-        assert_ne!(samples.point(1), samples.point(BLOCK + 1));
-        assert_ne!(PixelSamples::new(5, 6, 1).point(0), samples.point(0));
-    }
-}
+mod tests;

@@ -2,11 +2,12 @@
 
 use super::job::{Crop, Job};
 use crate::geom::{LANES, PacketBatch, RayHitPacket};
-use crate::math::{PixelSamples, concentric_disc, polar_disc, rejection_disc, uniform_radius_disc};
+use crate::math::{PixelSamples, Sampling, concentric_disc, polar_disc, rejection_disc, uniform_radius_disc};
 use crate::scene::desc::LensSampler;
 use crate::scene::{Camera, CameraRays};
 use crate::simd;
 use glam::DVec2;
+use std::ops::Range;
 
 /// Pixels along the side of a tile.
 pub const TILE: u32 = 32;
@@ -68,28 +69,35 @@ pub struct Segment<'a> {
     pub first: u32,
     /// Samples of each pixel.
     pub samples: u32,
+    /// Where they lie.
+    pub sampling: &'a Sampling,
 }
 
-/// Splits the work of a tile into segments; all samples of a pixel come in order.
-pub fn segments(pixels: &[(u32, u32)], spp: u32) -> impl Iterator<Item = Segment<'_>> {
-    let samples = spp.min(LANES as u32);
+/// Splits samples `range` of all pixels into segments; all samples of a pixel come in order.
+pub fn segments<'a>(
+    pixels: &'a [(u32, u32)],
+    range: Range<u32>,
+    sampling: &'a Sampling,
+) -> impl Iterator<Item = Segment<'a>> {
+    let samples = (range.end - range.start).min(LANES as u32);
     let at_once = SEGMENT / samples as usize;
     pixels.chunks(at_once).flat_map(move |pixels| {
-        (0..spp).step_by(samples as usize).map(move |first| Segment {
+        range.clone().step_by(samples as usize).map(move |first| Segment {
             pixels,
             first,
-            samples: samples.min(spp - first),
+            samples: samples.min(range.end - first),
+            sampling,
         })
     })
 }
 
-impl Segment<'_> {
+impl<'a> Segment<'a> {
     /// The sample points of the pixel that ray `slot` of the segment goes through, and which of
     /// them is the ray's.
     #[must_use]
-    pub fn samples_of(&self, slot: u32, seed: u32) -> (PixelSamples, u32) {
+    pub fn samples_of(&self, slot: u32) -> (PixelSamples<'a>, u32) {
         let (x, y) = self.pixels[(slot / self.samples) as usize];
-        (PixelSamples::new(x, y, seed), self.first + slot % self.samples)
+        (self.sampling.pixel(x, y), self.first + slot % self.samples)
     }
 
     /// Fills `batch` with the camera rays.
@@ -100,7 +108,7 @@ impl Segment<'_> {
         let (mut at, mut lens) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
         for (packet, live) in batch.packets_mut() {
             for (lane, (pixel, sample)) in points.by_ref().take(live).enumerate() {
-                let (x, y, disc) = image_point(camera, job, pixel, sample);
+                let (x, y, disc) = image_point(camera, job, self.sampling, pixel, sample);
                 (at[0][lane], at[1][lane]) = (x, y);
                 (lens[0][lane], lens[1][lane]) = (disc.x, disc.y);
             }
@@ -111,14 +119,14 @@ impl Segment<'_> {
 
 /// Where sample `sample` of `pixel` goes through the image, in pixels, and through the unit lens.
 #[inline]
-fn image_point(camera: &Camera, job: &Job, pixel: (u32, u32), sample: u32) -> (f64, f64, DVec2) {
+fn image_point(camera: &Camera, job: &Job, sampling: &Sampling, pixel: (u32, u32), sample: u32) -> (f64, f64, DVec2) {
     let (x, y) = (f64::from(pixel.0), f64::from(pixel.1));
     let lone = if job.centre { CENTRE } else { BESIDE_CENTRE };
     if job.spp == 1 && camera.lens.is_none() {
         return (x + lone.0, y + lone.1, DVec2::ZERO);
     }
-    let samples = PixelSamples::new(pixel.0, pixel.1, job.seed);
-    let [a, b, u, v] = samples.point(sample).map(f64::from);
+    let samples = sampling.pixel(pixel.0, pixel.1);
+    let [a, b, u, v] = samples.point(sample);
     let spread = |a: f64| 0.5 + 2.0 * job.jitter_radius * (a - 0.5);
     let (dx, dy) = if job.spp == 1 { lone } else { (spread(a), spread(b)) };
     let disc = if camera.lens.is_some() { on_lens(job.lens_sampler, samples, sample, [u, v]) } else { DVec2::ZERO };
@@ -126,7 +134,7 @@ fn image_point(camera: &Camera, job: &Job, pixel: (u32, u32), sample: u32) -> (f
 }
 
 /// A point of the unit disc by the sampler that was asked for.
-fn on_lens(sampler: LensSampler, samples: PixelSamples, sample: u32, [u, v]: [f64; 2]) -> DVec2 {
+fn on_lens(sampler: LensSampler, samples: PixelSamples<'_>, sample: u32, [u, v]: [f64; 2]) -> DVec2 {
     match sampler {
         LensSampler::Concentric => concentric_disc(u, v),
         LensSampler::Polar => polar_disc(u, v),
@@ -181,11 +189,12 @@ mod tests {
     #[test]
     fn segments_hold_every_sample_once_and_in_order() {
         let all = pixels_of(tiles(CROP)[0]);
+        let sampling = Job::whole((100, 100)).sampling();
         for spp in [1, 2, 5, 16, 17, 70] {
             let mut next = vec![0; all.len()];
             let mut at = std::collections::HashMap::new();
             at.extend(all.iter().enumerate().map(|(i, &p)| (p, i)));
-            for s in segments(&all, spp) {
+            for s in segments(&all, 0..spp, &sampling) {
                 assert!((1..=SEGMENT).contains(&(s.pixels.len() * s.samples as usize)));
                 for p in s.pixels {
                     assert_eq!(next[at[p]], s.first, "spp {spp}");

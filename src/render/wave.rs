@@ -56,6 +56,8 @@ pub struct Tally {
     pub facing_away: u64,
     /// Branches below the weight cut.
     pub below_cut: u64,
+    /// Rays of all kinds that were sent to compare with, and are not counted above.
+    pub again: u64,
     /// Largest answer of a surface to all lights; kept only where a bound needs it.
     pub brightest: f32,
 }
@@ -114,7 +116,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         contacts: &'a Contacts,
     ) -> Self {
         let cost = job.aovs.contains(&Aov::Cost).then(Vec::new);
-        let seen = job.aovs.iter().any(|&a| a != Aov::Cost).then(Vec::new);
+        let seen = job.aovs.iter().any(|&a| !matches!(a, Aov::Cost | Aov::Samples)).then(Vec::new);
         let lights = scene.lights.iter().filter(|l| needs.shadow_rays && l.color != Vec3::ZERO);
         let is_shapes: Vec<bool> = scene.objects.iter().map(|o| matches!(o, Object::Shapes(_))).collect();
         Self {
@@ -338,13 +340,13 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     /// Adds one light that has a size: a batch for each of its samples, and the share of them
     /// that got through.
     fn soft_light(&mut self, index: usize, segment: &Segment<'_>) {
-        let (light, rounds, seed) = (self.lights[index], self.job.light_samples.max(1), self.job.seed);
+        let (light, rounds) = (self.lights[index], self.job.light_samples.max(1));
         self.visible.clear();
         self.visible.resize(self.used, [0.0; LANES]);
         for round in 0..rounds {
             self.send_shadow_rays(|_, block, packet| {
                 let points = lights::points_on(block, &light, |lane| {
-                    let (samples, sample) = segment.samples_of(block.slot[lane], seed);
+                    let (samples, sample) = segment.samples_of(block.slot[lane]);
                     let number = sample.wrapping_mul(rounds).wrapping_add(round);
                     samples.on_light(number, index as u32, block.branch[lane])
                 });

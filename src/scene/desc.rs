@@ -2,6 +2,7 @@
 //! that it names. Every scene format ends here; `freeze` goes on.
 
 use super::CameraDesc;
+use crate::math::Sampler;
 use glam::{DMat4, DVec3};
 use std::path::PathBuf;
 
@@ -52,6 +53,8 @@ pub struct RenderDesc {
     /// Each camera ray passes within this many pixels of its pixel's centre, in x and y; half a
     /// pixel (the whole pixel) unless given.
     pub jitter_radius: Option<f64>,
+    /// How samples are drawn.
+    pub sampler: Option<Sampler>,
     /// How lens points are drawn.
     pub lens_sampler: Option<LensSampler>,
     /// The rules of the course scenes: highlight towards the camera's position at every depth,

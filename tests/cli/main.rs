@@ -6,6 +6,7 @@ mod compare;
 mod error;
 mod images;
 mod probe;
+mod sampling;
 mod scenes;
 mod signals;
 mod verify;

@@ -13,6 +13,7 @@ min_weight = 0.25
 seed = 7
 background = [0.1, 0.2, 0.3]
 ambient = [0.1, 0.1, 0.1]
+sampler = "stratified"
 lens_sampler = "polar"
 [camera.main]
 eye = [0, 1, 8]
@@ -122,6 +123,7 @@ fn a_flag_wins_over_the_scene_and_the_scene_over_the_default() {
         ("recursion", "-r 50", ["8", "3", "50"]),
         ("min-weight", "--min-weight 0", ["0.0009765625", "0.25", "0"]),
         ("seed", "--seed 1", ["0", "7", "1"]),
+        ("sampler", "--sampler random", ["sobol", "stratified", "random"]),
         ("lens-sampler", "--lens-sampler rejection", ["concentric", "polar", "rejection"]),
     ];
     for (name, flag, [default, scene, given]) in cases {
@@ -257,7 +259,7 @@ fn warnings_are_shown_counted_silenced_or_taken_for_errors() {
     bench.write("odd.toml", SCENE.replace("[material]\n", "[material]\nunused = { color = [1, 1, 1] }\n"));
     let out = bench.expect("odd.toml -o odd.png --stats odd.json", 0);
     let said = text(&out.stderr);
-    assert!(said.contains("warning: ") && said.contains("--> odd.toml:28:1"), "{said}");
+    assert!(said.contains("warning: ") && said.contains("--> odd.toml:29:1"), "{said}");
     let stats: Value = serde_json::from_slice(&bench.read("odd.json")).unwrap();
     assert_eq!((&stats["warnings"], &stats["skipped"]["unused_materials"]), (&1.into(), &1.into()));
     assert!(bench.expect("odd.toml -o odd.png -q", 0).stderr.is_empty());
@@ -266,7 +268,7 @@ fn warnings_are_shown_counted_silenced_or_taken_for_errors() {
     for words in ["odd.toml --strict -o none.png", "odd.toml --strict -q -o none.png", "check odd.toml --strict"] {
         let out = bench.expect(words, 3);
         let said = text(&out.stderr);
-        assert!(said.starts_with("error: ") && said.contains("odd.toml:28:1") && said.contains("--strict"), "{said}");
+        assert!(said.starts_with("error: ") && said.contains("odd.toml:29:1") && said.contains("--strict"), "{said}");
         assert!(!said.contains("warning: ") && out.stdout.is_empty(), "{said}");
     }
     assert!(!bench.path("none.png").exists());

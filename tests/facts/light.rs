@@ -3,6 +3,7 @@
 use crate::kit::{job, load, render};
 use glam::{DVec3, Vec3};
 use tison::backend::BackendKind;
+use tison::math::Sampler;
 use tison::render::Job;
 use tison::scene::desc::LensSampler;
 
@@ -57,8 +58,11 @@ fn a_ball_of_light_throws_a_half_shadow_of_the_right_width() {
     ));
     let n = 32;
     for &kind in BackendKind::COMPILED {
-        for (spp, light_samples) in [(1024, 1), (16, 64)] {
-            let outcome = render(kind, &scene, &Job { spp, light_samples, jitter_radius: 0.0, ..job(n, n) });
+        use Sampler::{Sobol, Stratified};
+        for (spp, light_samples, sampler) in
+            [(1024, 1, Sobol), (16, 64, Sobol), (16, 64, Stratified), (7, 129, Stratified)]
+        {
+            let outcome = render(kind, &scene, &Job { spp, light_samples, sampler, jitter_radius: 0.0, ..job(n, n) });
             for (i, p) in points(n).filter(|(_, p)| p.y.abs() < 0.1) {
                 // Where the plane of the edge cuts the light's disc, in radii from its middle.
                 let cut = (-2.0 * p.x) / 0.5;
@@ -74,7 +78,7 @@ fn a_ball_of_light_throws_a_half_shadow_of_the_right_width() {
                 // The disc is turned towards each point: a little narrower than seen from straight below.
                 assert!(
                     (share - (1.0 - hidden)).abs() < 0.02,
-                    "{kind:?}, {spp} spp, x = {}: {share} of the light, not {}",
+                    "{kind:?}, {sampler:?}, {spp} spp, x = {}: {share} of the light, not {}",
                     p.x,
                     1.0 - hidden
                 );

@@ -3,7 +3,7 @@
 use super::subject::Subject;
 use crate::backend::{AnyBackend, BackendKind};
 use crate::geom::{PacketBatch, Ray, RayHitPacket};
-use crate::math::{Branch, PixelSamples, concentric_disc};
+use crate::math::{Branch, PixelSamples, Sampling, concentric_disc};
 use crate::render::tile::Segment;
 use crate::render::{Job, SurfacePoint, Surfaces};
 use crate::scene::{Camera, CameraDesc, Light, Scene};
@@ -41,12 +41,14 @@ pub fn pixels(subject: &Subject) -> Result<Vec<bool>, String> {
     let camera = wide.prepare(&subject.scene.frame, subject.job.size)?;
     let jitter_radius = WIDER * subject.job.jitter_radius;
     let job = Job { spp: SAMPLES, seed: SEED, jitter_radius, ..subject.job.clone() };
+    let sampling = job.sampling();
     let backend = subject.backend(BackendKind::Native);
     let row = |y: u32| {
         let mut look = Look {
             scene: &subject.scene,
             camera: &camera,
             job: &job,
+            sampling: &sampling,
             backend,
             surfaces: Surfaces::new(&subject.scene),
         };
@@ -59,6 +61,7 @@ struct Look<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
     job: &'a Job,
+    sampling: &'a Sampling,
     backend: &'a AnyBackend,
     surfaces: Surfaces<'a>,
 }
@@ -68,7 +71,7 @@ impl Look<'_> {
         let mut first: Option<(SurfacePoint, u64)> = None;
         let mut batch = PacketBatch::<RayHitPacket>::default();
         for sample in (0..SAMPLES).step_by(AT_ONCE as usize) {
-            let segment = Segment { pixels: &[pixel], first: sample, samples: AT_ONCE };
+            let segment = Segment { pixels: &[pixel], first: sample, samples: AT_ONCE, sampling: self.sampling };
             segment.camera_rays(self.camera, self.job, &mut batch);
             self.backend.as_dyn().intersect_many(&mut batch, crate::geom::Coherence::Coherent);
             for packet in batch.packets() {
@@ -76,7 +79,7 @@ impl Look<'_> {
                 for (lane, point) in points.into_iter().enumerate() {
                     let shown = point.filter(|p| self.is_seen(p, &packet.ray.get(lane)) && self.is_matte(p));
                     let Some(point) = shown else { return false };
-                    let (samples, number) = segment.samples_of(lane as u32, SEED);
+                    let (samples, number) = segment.samples_of(lane as u32);
                     let lit = self.lights_seen(&point, samples, number);
                     let (as_first, lit_first) = first.get_or_insert((point, lit));
                     let alike = point.id == as_first.id && point.ns.dot(as_first.ns) > ALIKE && lit == *lit_first;
@@ -101,7 +104,7 @@ impl Look<'_> {
     }
 
     /// A bit for each light that shines on the point.
-    fn lights_seen(&self, point: &SurfacePoint, samples: PixelSamples, number: u32) -> u64 {
+    fn lights_seen(&self, point: &SurfacePoint, samples: PixelSamples<'_>, number: u32) -> u64 {
         let lights = self.scene.lights.iter().filter(|light| light.color != Vec3::ZERO);
         lights.take(LIGHTS).enumerate().fold(0, |seen, (i, light)| {
             let square = if light.radius > 0.0 { samples.on_light(number, i as u32, Branch::CAMERA) } else { [0.5; 2] };

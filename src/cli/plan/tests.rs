@@ -120,6 +120,7 @@ fn what_cannot_be_is_refused() {
         ("a.obj --tonemap acse", "'aces'"),
         ("a.obj --exposure 65", "from -64 to 64"),
         ("a.obj --lens-sampler polr", "'polar'"),
+        ("a.obj --sampler sobel", "'sobol'"),
         ("a.obj --light-samples 0", "0 is not in 1.."),
         ("a.obj -r 100001", "100001 is not in"),
         ("a.obj --camera frnt", "did you mean 'front'?"),

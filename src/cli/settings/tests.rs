@@ -12,6 +12,7 @@ fn said() -> RenderDesc {
         min_weight: Some(0.25),
         seed: Some(7),
         jitter_radius: Some(0.25),
+        sampler: Some(Sampler::Random),
         lens_sampler: Some(LensSampler::Polar),
         ..RenderDesc::default()
     }
@@ -39,6 +40,7 @@ fn each_setting_is_the_flags_else_the_scenes_else_the_default() {
         ("recursion", "-r=50", ["8", "3", "50"]),
         ("min-weight", "--min-weight 0.5", ["0.0009765625", "0.25", "0.5"]),
         ("seed", "--seed 9", ["0", "7", "9"]),
+        ("sampler", "--sampler stratified", ["sobol", "random", "stratified"]),
         ("lens-sampler", "--lens-sampler rejection", ["concentric", "polar", "rejection"]),
     ];
     for (name, flags, want) in cases {
@@ -60,11 +62,13 @@ fn what_is_shown_is_what_the_job_does() {
     let job = settings("a.toml", &said()).job;
     assert_eq!((job.size, job.spp, job.k_max, job.seed), ((640, 480), 4, 3, 7));
     assert_eq!((job.min_weight, job.jitter_radius, job.light_samples), (0.25, 0.25, 1));
-    assert_eq!(job.lens_sampler, LensSampler::Polar);
-    let flags = "a.toml --size 8x6 --spp 2 -r 5 --seed 1 --min-weight 0 --lens-sampler rejection --light-samples 9";
+    assert_eq!((job.sampler, job.lens_sampler), (Sampler::Random, LensSampler::Polar));
+    let flags = "a.toml --size 8x6 --spp 2 -r 5 --seed 1 --min-weight 0 --lens-sampler rejection --light-samples 9 \
+                 --sampler sobol";
     let job = settings(flags, &said()).job;
     assert_eq!((job.size, job.spp, job.k_max, job.seed), ((8, 6), 2, 5, 1));
     assert_eq!((job.min_weight, job.light_samples, job.lens_sampler), (0.0, 9, LensSampler::Rejection));
+    assert_eq!(job.sampler, Sampler::Sobol);
 }
 
 #[test]

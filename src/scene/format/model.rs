@@ -4,6 +4,7 @@ use super::diagnostic::Diagnostic;
 use super::reader::{Field, Table};
 use super::tree::{Context, Entry, Node, Span, Value};
 use super::{material, object};
+use crate::math::Sampler;
 use crate::scene::desc::{Falloff, LensSampler, LightDesc, NamedCamera, Place, RenderDesc, SceneDesc};
 use crate::scene::{CameraDesc, Projection};
 use glam::DVec3;
@@ -73,6 +74,7 @@ fn render(ctx: &Context, entry: &Entry) -> RenderDesc {
         background: t.opt("background").and_then(|f| f.color()),
         ambient: t.opt("ambient").and_then(|f| f.color()),
         jitter_radius: t.opt("jitter_radius").and_then(|f| f.number(radius, |x| (0.0..=16.0).contains(&x))),
+        sampler: t.opt("sampler").and_then(|f| f.choice(&Sampler::ALL.map(|s| (s.name(), s)))),
         lens_sampler: t.opt("lens_sampler").and_then(|f| f.choice(&LensSampler::ALL.map(|s| (s.name(), s)))),
         course_rules: t.opt("course_rules").and_then(|f| f.bool()).unwrap_or(false),
     };

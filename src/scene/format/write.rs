@@ -65,6 +65,9 @@ impl Writer {
         self.opt("background", r.background);
         self.opt("ambient", r.ambient);
         self.opt("jitter_radius", r.jitter_radius);
+        if let Some(sampler) = r.sampler {
+            self.text("sampler", sampler.name());
+        }
         if let Some(sampler) = r.lens_sampler {
             self.text("lens_sampler", sampler.name());
         }
