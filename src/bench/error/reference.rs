@@ -42,7 +42,7 @@ impl Reference {
             let job = Job { spp, seed: FIRST_SEED + block, min_weight: 0.0, ..subject.job.clone() };
             let backend = subject.backend(BackendKind::Native);
             let film = render::run(&subject.scene, &subject.camera, backend, &job, control)?.film;
-            if !film.is_complete() {
+            if control.is_cancelled() {
                 return Ok(None);
             }
             blocks.push(film);

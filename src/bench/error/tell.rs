@@ -91,7 +91,7 @@ fn figures(subject: &Subject, reference: &Reference, measured: &Measured) -> Sec
             let name = curve.candidate.name;
             table.rows.push(row(name, p));
             data.push(json!({
-                "scene": subject.name, "candidate": name, "spp": p.spp, "seconds": p.seconds, "rmse": p.rmse,
+                "scene": subject.name, "candidate": name, "target": p.target, "spp": p.spp, "seconds": p.seconds, "rmse": p.rmse,
                 "rmse_measured": p.rmse_measured, "reference_noise": reference.noise,
                 "rmse_smooth": finite(p.rmse_smooth), "reference_noise_smooth": finite(reference.noise_smooth),
                 "relmse": p.relmse, "relmse_trimmed": p.relmse_trimmed, "smape": p.smape, "max": p.max,
@@ -116,7 +116,7 @@ fn row(name: &str, p: &Point) -> Vec<String> {
     let lost = |value: f64, lost: bool| if lost { format!("({value:.2e})") } else { format!("{value:.2e}") };
     let or_none = |value: f64, text: String| if value.is_nan() { "-".to_owned() } else { text };
     vec![
-        name.to_owned(),
+        p.target.map_or(name.to_owned(), |t| format!("{name} to {t:.0e}")),
         samples(p.spp),
         format!("{:.2e}", p.seconds),
         lost(p.rmse, p.is_lost),
@@ -221,21 +221,20 @@ fn reached(subject: &Subject, measured: &Measured) -> Section {
     let mut data = Vec::new();
     for (curve, level) in LEVELS.iter().flat_map(|&level| measured.curves.iter().map(move |c| (c, level))) {
         let [spp, seconds] = [by_samples, by_seconds].map(|by| fit::reaches(&by(curve), level));
-        let [base_spp, base_seconds] = [by_samples, by_seconds].map(|by| fit::reaches(&by(baseline), level));
-        let factor = |own: Option<f64>, base: Option<f64>| Some(base? / own?);
-        let (fewer, less) = (factor(spp, base_spp), factor(seconds, base_seconds));
-        let times = |f: Option<f64>| f.map_or("-".into(), |f| format!("{f:.2}x"));
+        let fewer = Factor::of(spp, &by_samples(baseline), level);
+        let less = Factor::of(seconds, &by_seconds(baseline), level);
         table.rows.push(vec![
             curve.candidate.name.into(),
             format!("{level:.0e}"),
             spp.map_or("not reached".into(), samples),
             seconds.map_or("not reached".into(), |s| format!("{s:.2e}")),
-            times(fewer),
-            times(less),
+            Factor::text(fewer),
+            Factor::text(less),
         ]);
         data.push(json!({
             "scene": subject.name, "candidate": curve.candidate.name, "rmse": level, "spp": spp, "seconds": seconds,
-            "fewer_samples": fewer, "less_time": less,
+            "fewer_samples": fewer.map(|f| f.times), "fewer_samples_at_least": fewer.map(|f| f.at_least),
+            "less_time": less.map(|f| f.times), "less_time_at_least": less.map(|f| f.at_least),
         }));
     }
     Section {
@@ -243,7 +242,8 @@ fn reached(subject: &Subject, measured: &Measured) -> Section {
         title: format!("{}: what it takes to get there", subject.name),
         about: format!(
             "Samples a pixel and seconds at which the RMSE is first down to a level, between two points as the line in the \
-             plot has it, and how many times fewer and less that is than for {}.",
+             plot has it, and how many times fewer and less that is than for {}; at least so many where that does not get \
+             there. Samples of who is adaptive are the mean, with those that only estimate the error.",
             baseline.candidate.name
         ),
         repeat: String::new(),
@@ -251,6 +251,28 @@ fn reached(subject: &Subject, measured: &Measured) -> Section {
         data: Value::Array(data),
         plots: vec![],
         pictures: vec![],
+    }
+}
+
+/// How many times less somebody takes than the baseline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Factor {
+    times: f64,
+    /// The baseline does not get there: it is known only what it takes without getting there.
+    at_least: bool,
+}
+
+impl Factor {
+    fn of(own: Option<f64>, baseline: &[(f64, f64)], level: f64) -> Option<Self> {
+        let (base, at_least) = match fit::reaches(baseline, level) {
+            Some(base) => (base, false),
+            None => (baseline.last()?.0, true),
+        };
+        Some(Self { times: base / own?, at_least })
+    }
+
+    fn text(of: Option<Self>) -> String {
+        of.map_or("-".into(), |f| format!("{}{:.2}x", if f.at_least { "> " } else { "" }, f.times))
     }
 }
 
@@ -302,6 +324,7 @@ mod tests {
     fn what_is_lost_in_the_noise_and_all_after_it_is_not_fitted() {
         let point = |spp: f64, is_lost| Point {
             spp,
+            target: None,
             seconds: 1e-3 * spp,
             rmse_measured: 1.0 / spp,
             rmse: 1.0 / spp,
@@ -325,5 +348,15 @@ mod tests {
         assert!(line(&curve, by_samples(&curve)).name.ends_with("  -1.00"));
         assert_eq!(row("a", &points[2])[3..5], ["(6.25e-2)".to_owned(), "-".to_owned()]);
         assert!((points[0].efficiency() - 1e3).abs() < 1e-9);
+    }
+
+    #[test]
+    fn factors_are_bounds_where_the_baseline_does_not_get_there() {
+        let baseline = [(1.0, 1.0), (100.0, 0.1)];
+        let text = |own, level| Factor::text(Factor::of(own, &baseline, level));
+        assert_eq!(text(Some(10.0), 0.1), "10.00x");
+        assert_eq!(text(Some(50.0), 0.05), "> 2.00x");
+        assert_eq!(text(None, 0.1), "-");
+        assert_eq!(Factor::of(Some(1.0), &[], 0.1), None);
     }
 }
