@@ -92,6 +92,25 @@ impl Segment<'_> {
         (sampling.pixel(x, y), self.first + slot % self.samples)
     }
 
+    /// Mean of the filter's weights over all samples of pixel number `pixel`.
+    #[must_use]
+    pub fn mean_weight(&self, pixel: usize, job: &Job, sampling: &Sampling) -> f64 {
+        let (x, y) = self.pixels[pixel];
+        let samples = sampling.pixel(x, y);
+        (0..job.spp).map(|sample| filter_weight(job, samples, sample)).sum::<f64>() / f64::from(job.spp)
+    }
+
+    /// What the sample of ray `slot` counts in its pixel, whose [`mean_weight`](Self::mean_weight) is `mean`.
+    ///
+    /// That is the filter's weight, moved so that the mean of all is 1: a flat area stays flat, where the weights alone
+    /// would make it noisy. What that adds to the expected value falls with the number of samples. It is the control
+    /// variate `weight - 1`, with the mean of the colours as its coefficient.
+    #[must_use]
+    pub fn weight(&self, slot: u32, mean: f64, job: &Job, sampling: &Sampling) -> f64 {
+        let (samples, sample) = self.samples_of(slot, sampling);
+        1.0 + (filter_weight(job, samples, sample) - mean)
+    }
+
     /// Fills `batch` with the camera rays.
     pub fn camera_rays(&self, camera: &Camera, job: &Job, sampling: &Sampling, batch: &mut PacketBatch<RayHitPacket>) {
         batch.resize(self.pixels.len() * self.samples as usize);
@@ -109,6 +128,12 @@ impl Segment<'_> {
     }
 }
 
+/// See [`Filter::weight`](crate::math::Filter::weight).
+fn filter_weight(job: &Job, samples: PixelSamples<'_>, sample: u32) -> f64 {
+    let [a, b, ..] = samples.point(sample);
+    job.filter.weight(job.offset(a), job.offset(b))
+}
+
 /// Where sample `sample` of `pixel` goes through the image, in pixels, and through the unit lens.
 #[inline]
 fn image_point(camera: &Camera, job: &Job, sampling: &Sampling, pixel: (u32, u32), sample: u32) -> (f64, f64, DVec2) {
@@ -119,8 +144,7 @@ fn image_point(camera: &Camera, job: &Job, sampling: &Sampling, pixel: (u32, u32
     }
     let samples = sampling.pixel(pixel.0, pixel.1);
     let [a, b, u, v] = samples.point(sample);
-    let spread = |a: f64| 0.5 + 2.0 * job.jitter_radius * (a - 0.5);
-    let (dx, dy) = if job.spp == 1 { lone } else { (spread(a), spread(b)) };
+    let (dx, dy) = if job.spp == 1 { lone } else { (0.5 + job.offset(a), 0.5 + job.offset(b)) };
     let disc = if camera.lens.is_some() { on_lens(job.lens_sampler, samples, sample, [u, v]) } else { DVec2::ZERO };
     (x + dx, y + dy, disc)
 }

@@ -38,7 +38,7 @@ struct Waiting {
 /// What the rays of a segment gather, one entry per sample.
 #[derive(Debug, Default)]
 pub struct Gathered {
-    /// Linear RGB.
+    /// Linear RGB, times the weight of the pixel filter.
     pub color: Vec<DVec3>,
     /// Bound on what was left out by the weight cut and `k_max`, linear: `(fixed, scaled)` as in [`Bound`].
     pub cut: Vec<[f64; 2]>,
@@ -77,6 +77,8 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
     clip: Option<(f64, f64)>,
     /// Where samples lie.
     pub sampling: Sampling,
+    /// Of the pixels of the current segment, where the filter has negative lobes.
+    mean_weights: Vec<f64>,
     palette: Palette,
     /// Of each material: whether it sends rays on.
     branching: Vec<bool>,
@@ -130,6 +132,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             seen_from: scene.course_rules.then_some(camera.eye),
             clip: camera.clip,
             sampling: job.sampling(),
+            mean_weights: Vec::new(),
             palette: Palette::of(scene),
             branching: scene.materials.iter().map(|m| m.reflects() || m.refracts()).collect(),
 
@@ -180,6 +183,25 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         self.shade(segment);
         if SECONDARY {
             self.secondary_waves(segment);
+        }
+        if self.job.has_negative_samples() {
+            self.weigh(segment);
+        }
+    }
+
+    /// Makes each sample count what the pixel filter says; what was left out counts as much, whatever the sign.
+    fn weigh(&mut self, segment: &Segment<'_>) {
+        if segment.first == 0 {
+            let mean = |pixel| segment.mean_weight(pixel, self.job, &self.sampling);
+            self.mean_weights = (0..segment.pixels.len()).map(mean).collect();
+        }
+        for (slot, color) in self.gathered.color.iter_mut().enumerate() {
+            let mean = self.mean_weights[slot / segment.samples as usize];
+            let weight = segment.weight(slot as u32, mean, self.job, &self.sampling);
+            *color *= weight;
+            if SECONDARY {
+                self.gathered.cut[slot] = self.gathered.cut[slot].map(|c| c * weight.abs());
+            }
         }
     }
 
