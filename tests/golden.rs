@@ -48,6 +48,9 @@ pictures! {
     cube: "cube.toml", EDGES;
     cylinder: "cylinder.toml", EDGES;
     diffuse: "diffuse.toml", EDGES;
+    error_edges: "error_edges.toml", EDGES;
+    error_lens: "error_lens.toml", EDGES;
+    error_shadow: "error_shadow.toml", EDGES;
     falloff: "falloff.toml", EDGES;
     fresnel: "fresnel.toml", EDGES;
     instances: "instances.toml", EDGES;

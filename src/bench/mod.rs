@@ -5,22 +5,25 @@
 //! |---|---|
 //! | `truth` | where a ray meets a shape, exactly |
 //! | `random`, `setup` | numbers, rays and scenes to measure with |
-//! | `textbook` | the shapes as books test them, in f32 |
+//! | `textbook`, `robust` | the shapes as books test them, in f32, and as careful ones do |
 //! | `wrong` | wrong answers about single shapes |
 //! | `closed` | rays in closed meshes: how many leak |
 //! | `leaving` | rays that leave surfaces: how many meet them again |
 //! | `cost` | the time of a test and of a refinement |
 //! | `stability` | all of that in one report |
 //! | `speed` | the native tracer against Embree |
+//! | `error` | run time against error of whole pictures |
 //! | `report`, `plot` | tables, pages, SVG |
 //!
 //! The tests ask the same questions with fewer rays.
 
 pub mod closed;
 pub mod cost;
+pub mod error;
 pub mod leaving;
 pub mod plot;
 pub mod report;
+pub mod robust;
 pub mod setup;
 pub mod speed;
 pub mod stability;

@@ -14,6 +14,8 @@ pub struct Plot {
     pub y: String,
     /// What is drawn.
     pub lines: Vec<Line>,
+    /// Name and height of a dashed line, under which values mean little.
+    pub floor: Option<(String, f64)>,
 }
 
 /// Points joined by a line.
@@ -25,14 +27,17 @@ pub struct Line {
     pub points: Vec<(f64, f64)>,
 }
 
-const WIDTH: f64 = 560.0;
+/// Of a letter in the legend, about.
+const LETTER: f64 = 6.4;
+/// From the plot to the legend's words.
+const LEGEND: f64 = 30.0;
 const LEFT: f64 = 62.0;
 const RIGHT: f64 = 400.0;
 const TOP: f64 = 34.0;
 const BOTTOM: f64 = 258.0;
 const HEIGHT: f64 = 304.0;
-/// Red, blue, green, orange, violet, grey: as dark as they are light.
-const COLOURS: [&str; 6] = ["#d1495b", "#3d8fd1", "#3a9d5d", "#d98a1f", "#9673c9", "#858585"];
+/// Red, blue, green, orange, violet, grey, turquoise, brown: as dark as they are light.
+const COLOURS: [&str; 8] = ["#d1495b", "#3d8fd1", "#3a9d5d", "#d98a1f", "#9673c9", "#858585", "#2ba3a0", "#a9744f"];
 /// Labels along an axis, at most.
 const LABELS: i32 = 8;
 
@@ -91,14 +96,23 @@ impl Plot {
     pub fn svg(&self) -> String {
         let finite = || self.lines.iter().flat_map(|l| &l.points).filter(|p| p.0.is_finite() && p.1.is_finite());
         let x = Decades::of(finite().map(|p| p.0), LEFT, RIGHT);
-        let y = Decades::of(finite().map(|p| p.1), BOTTOM, TOP);
+        let floor = self.floor.iter().map(|f| f.1).filter(|f| f.is_finite());
+        let y = Decades::of(finite().map(|p| p.1).chain(floor), BOTTOM, TOP);
+        let width = self.width();
         let mut out = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" \
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {HEIGHT}\" width=\"{width}\" \
              height=\"{HEIGHT}\" role=\"img\" font-family=\"sans-serif\" font-size=\"12\" fill=\"currentColor\">\n"
         );
         self.write(&mut out, &x, &y).expect("a string takes everything");
         out += "</svg>\n";
         out
+    }
+
+    /// So wide that the legend fits.
+    fn width(&self) -> f64 {
+        let names = self.lines.iter().map(|l| &l.name).chain(self.floor.iter().map(|f| &f.0));
+        let longest = names.map(|name| name.chars().count()).max().unwrap_or(0);
+        RIGHT + LEGEND + 10.0 + (LETTER * longest as f64).ceil()
     }
 
     fn write(&self, out: &mut String, x: &Decades, y: &Decades) -> std::fmt::Result {
@@ -129,9 +143,25 @@ impl Plot {
             line.write(out, (x, y), colour, radius)?;
             let legend = TOP + 10.0 + 20.0 * i as f64;
             mark(out, (RIGHT + 16.0, legend), colour, radius)?;
-            writeln!(out, "<text x=\"{}\" y=\"{:.1}\">{}</text>", RIGHT + 30.0, legend + 4.0, escaped(&line.name))?;
+            writeln!(out, "<text x=\"{}\" y=\"{:.1}\">{}</text>", RIGHT + LEGEND, legend + 4.0, escaped(&line.name))?;
         }
-        Ok(())
+        self.write_floor(out, y)
+    }
+
+    /// The dashed line, and its place at the end of the legend.
+    fn write_floor(&self, out: &mut String, y: &Decades) -> std::fmt::Result {
+        let Some((name, value)) = self.floor.as_ref().filter(|f| f.1.is_finite()) else { return Ok(()) };
+        let dashed = |out: &mut String, from: f64, to: f64, at: f64| {
+            writeln!(
+                out,
+                "<line x1=\"{from}\" y1=\"{at:.1}\" x2=\"{to}\" y2=\"{at:.1}\" stroke=\"currentColor\" \
+                 stroke-width=\"1.5\" stroke-dasharray=\"6 4\"/>"
+            )
+        };
+        let legend = TOP + 10.0 + 20.0 * self.lines.len() as f64;
+        dashed(out, LEFT, RIGHT, y.at(*value))?;
+        dashed(out, RIGHT + 6.0, RIGHT + 26.0, legend)?;
+        writeln!(out, "<text x=\"{}\" y=\"{:.1}\">{}</text>", RIGHT + LEGEND, legend + 4.0, escaped(name))
     }
 }
 
@@ -188,9 +218,12 @@ mod tests {
                 Line { name: "one".into(), points: vec![(1.0, 2.0), (10.0, f64::NAN), (100.0, 0.0)] },
                 Line { name: "two".into(), points: vec![] },
             ],
+            floor: Some(("noise".into(), 1e-3)),
         };
         let svg = plot.svg();
-        for part in ["a &lt; b", "rays", "ns &amp; more", "one", "two", "polyline", "currentColor"] {
+        for part in
+            ["a &lt; b", "rays", "ns &amp; more", "one", "two", "polyline", "currentColor", "stroke-dasharray", "noise"]
+        {
             assert!(svg.contains(part), "{part} is not in {svg}");
         }
         assert!(!svg.contains("NaN"));

@@ -1,8 +1,11 @@
 //! What was measured, as text, JSON and a page with plots.
 
 use super::plot::{Plot, escaped};
+use crate::film::{self, Display, Film, Format, Notes};
+use base64::prelude::{BASE64_STANDARD, Engine};
 use serde_json::{Value, json};
 use std::fmt::Write;
+use std::io::Cursor;
 
 /// All that one run measured.
 #[derive(Clone, Debug)]
@@ -20,8 +23,8 @@ pub struct Report {
 /// One table and its plots.
 #[derive(Clone, Debug)]
 pub struct Section {
-    /// Name in JSON.
-    pub name: &'static str,
+    /// Name in JSON and CSV; every section has another.
+    pub name: String,
     /// Above the table.
     pub title: String,
     /// What the columns mean.
@@ -30,11 +33,51 @@ pub struct Section {
     pub repeat: String,
     /// What people read.
     pub table: Table,
-    /// What programs read.
+    /// What programs read: a list of objects without lists in them.
     pub data: Value,
     /// What both look at.
     pub plots: Vec<Plot>,
+    /// Pictures of what was measured.
+    pub pictures: Vec<Thumbnail>,
 }
+
+/// Small pictures that the page shows enlarged, side by side.
+#[derive(Clone, Debug)]
+pub struct Thumbnail {
+    /// Below them.
+    pub caption: String,
+    /// Width and height in pixels, and a PNG file.
+    pngs: Vec<((u32, u32), Vec<u8>)>,
+}
+
+impl Thumbnail {
+    /// `films` as the sRGB pictures that tison writes of them.
+    #[must_use]
+    pub fn new(caption: String, films: &[&Film]) -> Self {
+        let png = |film: &&Film| {
+            let mut out = Cursor::new(Vec::new());
+            film::encode(film, Format::Png, &Display::default(), &Notes::default(), &mut out)
+                .expect("memory takes everything, and a PNG every size");
+            ((film.width, film.height), out.into_inner())
+        };
+        Self { caption, pngs: films.iter().map(png).collect() }
+    }
+
+    fn html(&self) -> String {
+        let image = |((width, height), png): &((u32, u32), Vec<u8>)| {
+            // Pixels stay squares, so that each can be told from its neighbours.
+            let zoom = (WIDE / width).max(1);
+            let data = BASE64_STANDARD.encode(png);
+            let (width, height) = (width * zoom, height * zoom);
+            format!("<img alt=\"\" width=\"{width}\" height=\"{height}\" src=\"data:image/png;base64,{data}\">")
+        };
+        let images: String = self.pngs.iter().map(image).collect();
+        format!("<figure>{images}<figcaption>{}</figcaption></figure>\n", escaped(&self.caption))
+    }
+}
+
+/// CSS pixels that an enlarged picture is wide, at most.
+const WIDE: u32 = 288;
 
 /// Words in rows.
 #[derive(Clone, Debug, Default)]
@@ -125,7 +168,8 @@ impl Table {
             format!("<tr>{cells}</tr>\n")
         };
         let rows: String = self.rows.iter().map(|r| row(r, "td")).collect();
-        format!("<table>\n<thead>{}</thead>\n<tbody>\n{rows}</tbody>\n</table>\n", row(&self.columns, "th"))
+        let head = row(&self.columns, "th");
+        format!("<div class=\"table\"><table>\n<thead>{head}</thead>\n<tbody>\n{rows}</tbody>\n</table></div>\n")
     }
 }
 
@@ -147,7 +191,7 @@ impl Report {
         let sections: serde_json::Map<_, _> = self
             .sections
             .iter()
-            .map(|s| (s.name.to_owned(), json!({ "title": s.title, "repeat": s.repeat, "data": s.data })))
+            .map(|s| (s.name.clone(), json!({ "title": s.title, "repeat": s.repeat, "data": s.data })))
             .collect();
         json!({
             "tison": env!("CARGO_PKG_VERSION"),
@@ -157,6 +201,37 @@ impl Report {
             "embree": self.machine.embree,
             "sections": sections,
         })
+    }
+
+    /// For spreadsheets: a row for each object in `data` of each section, with the section's name before it and a column
+    /// for each key that any of them has. What an object has not is empty.
+    #[must_use]
+    pub fn csv(&self) -> String {
+        let mut rows: Vec<(&str, &serde_json::Map<_, _>)> = Vec::new();
+        for section in &self.sections {
+            let objects = section.data.as_array().into_iter().flatten().filter_map(Value::as_object);
+            rows.extend(objects.map(|object| (section.name.as_str(), object)));
+        }
+        let mut keys: Vec<&str> = Vec::new();
+        for key in rows.iter().flat_map(|(_, object)| object.keys()) {
+            if !keys.contains(&key.as_str()) {
+                keys.push(key);
+            }
+        }
+        let cell = |value: Option<&Value>| match value {
+            None | Some(Value::Null) => String::new(),
+            Some(Value::String(text)) => text.clone(),
+            Some(other) => other.to_string(),
+        };
+        let mut out = csv::Writer::from_writer(Vec::new());
+        let header = std::iter::once("section").chain(keys.iter().copied());
+        out.write_record(header).expect("memory takes everything");
+        for (name, object) in &rows {
+            let cells = keys.iter().map(|&key| cell(object.get(key)));
+            out.write_record(std::iter::once((*name).to_owned()).chain(cells)).expect("rows are of one length");
+        }
+        let bytes = out.into_inner().expect("memory takes everything");
+        String::from_utf8(bytes).expect("made of strings")
     }
 
     /// A page that needs nothing beside it.
@@ -171,6 +246,10 @@ impl Report {
                 let plots: String = s.plots.iter().map(Plot::svg).collect();
                 out += &format!("<div class=\"plots\">\n{plots}</div>\n");
             }
+            if !s.pictures.is_empty() {
+                let pictures: String = s.pictures.iter().map(Thumbnail::html).collect();
+                out += &format!("<div class=\"pictures\">\n{pictures}</div>\n");
+            }
             out += &format!("{}<p>Repeat: <code>{}</code></p>\n", s.table.html(), escaped(&s.repeat));
         }
         out + "</body>\n</html>\n"
@@ -184,12 +263,17 @@ const HEAD: &str = "<!DOCTYPE html>
 <meta name=\"viewport\" content=\"width=device-width\">
 <style>
 :root { color-scheme: light dark; }
-body { font: 15px/1.5 sans-serif; margin: 2em auto; max-width: 1180px; padding: 0 1em; color: #222; background: #fff; }
+body { font: 15px/1.5 sans-serif; margin: 2em auto; max-width: 1240px; padding: 0 1em; color: #222; background: #fff; }
 table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums; }
 th, td { padding: 2px 10px; text-align: right; border-bottom: 1px solid #8884; white-space: nowrap; }
 th:first-child, td:first-child { text-align: left; }
 .plots { display: flex; flex-wrap: wrap; gap: 8px; }
 .plots svg { max-width: 100%; height: auto; }
+.pictures { display: flex; flex-wrap: wrap; gap: 12px; margin: 1em 0; }
+.pictures img { image-rendering: pixelated; margin-right: 4px; }
+figure { margin: 0; }
+figcaption { font-size: 13px; }
+.table { overflow-x: auto; }
 @media (prefers-color-scheme: dark) { body { color: #ddd; background: #181818; } }
 </style>
 ";
@@ -202,13 +286,14 @@ mod tests {
         let mut table = Table::new(&["shape", "ns"]);
         table.rows.push(vec!["cube <1>".into(), "12.5".into()]);
         let section = Section {
-            name: "cost",
+            name: "cost".into(),
             title: "Cost".into(),
             about: "of a test".into(),
             repeat: "tison bench stability --only cost".into(),
             table,
             data: json!([{ "shape": "cube", "ns": 12.5 }]),
-            plots: vec![Plot { title: "p".into(), x: "x".into(), y: "y".into(), lines: vec![] }],
+            plots: vec![Plot { title: "p".into(), x: "x".into(), y: "y".into(), lines: vec![], floor: None }],
+            pictures: vec![Thumbnail::new("a & b".into(), &[&Film::new(4, 2, &[])])],
         };
         let machine = Machine { processor: None, threads: 2, embree: None };
         Report { title: "All".into(), about: "it".into(), machine, sections: vec![section] }
@@ -228,8 +313,24 @@ mod tests {
         assert!(json["embree"].is_null());
         let html = report().html();
         assert!(html.contains("<td>cube &lt;1&gt;</td>") && html.contains("<svg") && html.ends_with("</html>\n"));
+        assert!(html.contains("width=\"288\" height=\"144\" src=\"data:image/png;base64,iVBOR"), "{html}");
+        assert!(html.contains("<figcaption>a &amp; b</figcaption>"), "{html}");
         assert!(
             !html.contains("http://") || html.matches("http://").count() == html.matches("http://www.w3.org").count()
         );
+    }
+
+    #[test]
+    fn csv_has_a_row_for_each_object_and_a_column_for_each_key() {
+        let mut report = report();
+        let other = Section {
+            name: "more, \"quoted\"".into(),
+            data: json!([{ "a": null, "shape": "x,y" }, { "a": true, "ns": 1e-9 }]),
+            ..report.sections[0].clone()
+        };
+        report.sections.push(other);
+        let want = "section,ns,shape,a\ncost,12.5,cube,\n\"more, \"\"quoted\"\"\",,\"x,y\",\n\
+                    \"more, \"\"quoted\"\"\",1e-9,,true\n";
+        assert_eq!(report.csv(), want);
     }
 }

@@ -309,10 +309,10 @@ fn section(found: &[Found], threads: usize, options: &Options) -> Section {
         };
         let mut lines = vec![line("native", |f| Some(f.native)), line("Embree", |f| Some(f.embree.as_ref()?.value))];
         lines.retain(|l| !l.points.is_empty());
-        Plot { title: (*kind).into(), x: "triangles".into(), y: "Mrays/s".into(), lines }
+        Plot { title: (*kind).into(), x: "triangles".into(), y: "Mrays/s".into(), lines, floor: None }
     };
     Section {
-        name: if threads == 1 { "one_thread" } else { "all_threads" },
+        name: if threads == 1 { "one_thread" } else { "all_threads" }.into(),
         title: if threads == 1 { "One thread".into() } else { format!("{threads} threads") },
         about: format!(
             "Mrays/s, more is better, and seconds to build, less is better; medians of {} rounds in turn.",
@@ -322,6 +322,7 @@ fn section(found: &[Found], threads: usize, options: &Options) -> Section {
         table,
         data: Value::Array(data),
         plots: kinds.iter().map(plot).collect(),
+        pictures: vec![],
     }
 }
 

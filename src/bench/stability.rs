@@ -189,9 +189,10 @@ fn wrong_of(sweep: Sweep, shape: Shape) -> Result<Section, Error> {
         x: sweep.axis().into(),
         y: y.into(),
         lines: (0..names.len()).map(|i| line(i, of)).collect(),
+        floor: None,
     };
     Ok(Section {
-        name: sweep.section(shape),
+        name: sweep.section(shape).into(),
         title: format!("Wrong answers: {}, by the {}", shape.name(), sweep.axis()),
         about: format!(
             "Hits missed / made up, and the worst relative error of t, of {RAYS} rays without those that a relative \
@@ -201,6 +202,7 @@ fn wrong_of(sweep: Sweep, shape: Shape) -> Result<Section, Error> {
         table,
         data: Value::Array(data),
         plots: vec![plot("share of wrong answers", Count::share), plot("worst relative error of t", |c| c.worst_t)],
+        pictures: vec![],
     })
 }
 
@@ -275,13 +277,14 @@ fn leaks(rays: u64) -> Result<Section, Error> {
         }
     }
     Ok(Section {
-        name: Part::Leaks.name(),
+        name: Part::Leaks.name().into(),
         title: "Leaks of closed meshes".into(),
         about: format!("Rays from inside that hit nothing, of {rays} in each case; half of them start in the middle."),
         repeat: format!("{} --rays {rays}", repeat(Part::Leaks)),
         table,
         data: Value::Array(data),
         plots: vec![],
+        pictures: vec![],
     })
 }
 
@@ -332,7 +335,7 @@ fn shadows(rays: u64) -> Result<Section, Error> {
         }
     }
     Ok(Section {
-        name: Part::Shadows.name(),
+        name: Part::Shadows.name().into(),
         title: "False self-hits".into(),
         about: format!(
             "Shadow rays and mirrored rays of the renderer that meet the convex object that they leave, of at least \
@@ -344,6 +347,7 @@ fn shadows(rays: u64) -> Result<Section, Error> {
         table,
         data: Value::Array(data),
         plots: vec![],
+        pictures: vec![],
     })
 }
 
@@ -363,7 +367,7 @@ fn test_cost() -> Section {
         }));
     }
     Section {
-        name: "cost_of_tests",
+        name: "cost_of_tests".into(),
         title: "Cost of a test".into(),
         about: format!(
             "Nanoseconds of one ray against one shape, about half of them hits, on one thread: medians of {ROUNDS} \
@@ -373,6 +377,7 @@ fn test_cost() -> Section {
         table,
         data: Value::Array(data),
         plots: vec![],
+        pictures: vec![],
     }
 }
 
@@ -384,7 +389,7 @@ fn refine_cost() -> Result<Section, Error> {
         data.push(json!({ "what": c.what, "ns": c.ns }));
     }
     Ok(Section {
-        name: "cost_of_refining",
+        name: "cost_of_refining".into(),
         title: "Cost of refining a hit".into(),
         about: format!(
             "Nanoseconds that the surface point of a reported hit takes in f64, without texture coordinates, on one \
@@ -394,5 +399,6 @@ fn refine_cost() -> Result<Section, Error> {
         table,
         data: Value::Array(data),
         plots: vec![],
+        pictures: vec![],
     })
 }

@@ -7,13 +7,13 @@ use glam::Vec3;
 
 /// `t` if it lies in the open interval.
 #[inline]
-fn inside(ray: &Ray, t: f32) -> Option<f32> {
+pub(super) fn inside(ray: &Ray, t: f32) -> Option<f32> {
     (t > ray.t_near && t < ray.t_far).then_some(t)
 }
 
 /// The first of two parameters in the interval, if `ok` says so of it.
 #[inline]
-fn first(ray: &Ray, near: f32, far: f32, ok: impl Fn(f32) -> bool) -> Option<f32> {
+pub(super) fn first(ray: &Ray, near: f32, far: f32, ok: impl Fn(f32) -> bool) -> Option<f32> {
     [near, far].into_iter().find(|&t| inside(ray, t).is_some() && ok(t))
 }
 

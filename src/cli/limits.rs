@@ -5,23 +5,26 @@ use super::frame::Frame;
 use super::style::bytes;
 use super::system;
 use tison::film::{Aov, Film};
+use tison::render;
 
 /// Longest side of what is rendered at once: what the header of a JPEG can state.
 pub const MAX_SIDE: u64 = 65_535;
 
 /// Refuses images that are too large for tison or for this machine's free memory.
-pub fn check(frame: &Frame, aovs: &[Aov]) -> Result<(), Failure> {
+pub fn check(frame: &Frame, aovs: &[Aov], adaptive: bool) -> Result<(), Failure> {
     if frame.pixel.is_some() {
         return Ok(());
     }
     let crop = frame.crop;
     let (width, height) = (u64::from(crop.x1 - crop.x0), u64::from(crop.y1 - crop.y0));
-    refuse(width, height, memory_needed(width, height, aovs), system::available_memory())
+    refuse(width, height, memory_needed(width, height, aovs, adaptive), system::available_memory())
 }
 
-/// The film, and as much again for the encoder's copy of it.
-fn memory_needed(width: u64, height: u64, aovs: &[Aov]) -> u64 {
-    Film::bytes(width, height, aovs).saturating_mul(2)
+/// The film, and as much again for the encoder's copy of it; before that, what adaptive sampling knows of the pixels.
+fn memory_needed(width: u64, height: u64, aovs: &[Aov], adaptive: bool) -> u64 {
+    let film = Film::bytes(width, height, aovs);
+    let pixels = if adaptive { width.saturating_mul(height).saturating_mul(render::bytes_per_pixel(aovs)) } else { 0 };
+    film.saturating_add(film.max(pixels))
 }
 
 fn refuse(width: u64, height: u64, needed: u64, available: Option<u64>) -> Result<(), Failure> {

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use std::str::FromStr;
+use std::time::Duration;
 
 /// `WxH`, each at least 1. Wider than any image can be: the limits are checked by the plan,
 /// which can say more about them.
@@ -111,6 +112,29 @@ pub fn bound(s: &str) -> Result<f64, String> {
     if v >= 0.0 { Ok(v) } else { Err("expected 0 or more".into()) }
 }
 
+/// More than 0, less than 1.
+pub fn share(s: &str) -> Result<f64, String> {
+    let v = finite(s)?;
+    if v > 0.0 && v < 1.0 { Ok(v) } else { Err("expected a share between 0 and 1, like 0.01".into()) }
+}
+
+/// More than 0.
+pub fn error(s: &str) -> Result<f64, String> {
+    let v = finite(s)?;
+    if v > 0.0 { Ok(v) } else { Err("expected an error greater than 0, like 0.003".into()) }
+}
+
+/// More than 0, up to a year.
+pub fn seconds(s: &str) -> Result<Duration, String> {
+    const YEAR: f64 = 365.0 * 86_400.0;
+    let v = finite(s)?;
+    if v > 0.0 && v <= YEAR {
+        Ok(Duration::from_secs_f64(v))
+    } else {
+        Err("expected seconds, more than 0 and at most a year".into())
+    }
+}
+
 /// Pixels to a degree of the eye's field.
 pub fn pixels_per_degree(s: &str) -> Result<f64, String> {
     let v = finite(s)?;
@@ -217,6 +241,10 @@ mod tests {
         assert_eq!(exposure("-1.5"), Ok(-1.5));
         assert!(exposure("64").is_ok() && exposure("65").is_err() && exposure("nan").is_err());
         assert!(bound("0").is_ok() && bound("-1").is_err() && bound("nan").is_err() && bound("inf").is_err());
+        assert!(share("0.01").is_ok() && share("0").is_err() && share("1").is_err() && share("nan").is_err());
+        assert!(error("3e-3").is_ok() && error("0").is_err() && error("-1").is_err() && error("inf").is_err());
+        assert_eq!(seconds("2.5"), Ok(Duration::from_millis(2500)));
+        assert!(seconds("0").is_err() && seconds("-1").is_err() && seconds("1e30").is_err() && seconds("nan").is_err());
         assert!(pixels_per_degree("67").is_ok() && pixels_per_degree("0.9").is_err());
         assert!(define("a.b=1").is_ok() && define("a.b=").is_ok());
         assert!(define("a.b").is_err() && define("=1").is_err() && define("").is_err());

@@ -26,6 +26,7 @@ pub enum Stage {
     Render,
     #[cfg(feature = "embree")]
     Compare,
+    Measure,
     Write,
 }
 
@@ -37,6 +38,7 @@ impl Stage {
             Self::Render => "render",
             #[cfg(feature = "embree")]
             Self::Compare => "compare",
+            Self::Measure => "measure",
             Self::Write => "write",
         }
     }
@@ -71,6 +73,8 @@ struct Now {
     pixels: u64,
     /// Pixels to render in all.
     pixels_total: u64,
+    /// Of a measurement: shares of it that are done before and after `pixels_total` pixels more than `pixels`.
+    shares: (f64, f64),
     over: bool,
 }
 
@@ -94,7 +98,15 @@ impl Progress {
             ProgressMode::None => None,
         };
         let watched = sink.is_some();
-        let now = Now { stage: Stage::Read, since: started, rays: 0, pixels: 0, pixels_total: 0, over: false };
+        let now = Now {
+            stage: Stage::Read,
+            since: started,
+            rays: 0,
+            pixels: 0,
+            pixels_total: 0,
+            shares: (0.0, 0.0),
+            over: false,
+        };
         let shared = Arc::new(Shared {
             control: Arc::clone(control),
             started,
@@ -121,6 +133,16 @@ impl Progress {
     /// Pixels of all images together.
     pub fn expect_pixels(&self, total: u64) {
         self.shared.now().pixels_total = total;
+    }
+
+    /// A measurement has come to share `from` (0 to 1) and takes so many pixels to get to share `to`.
+    pub fn measure(&self, from: f64, to: f64, pixels: u64) {
+        let mut now = self.shared.now();
+        if now.stage != Stage::Measure {
+            (now.stage, now.since) = (Stage::Measure, Instant::now());
+        }
+        (now.shares, now.pixels_total) = ((from, to), pixels);
+        now.pixels = self.shared.control.pixels.load(Relaxed);
     }
 
     /// `share` (0 to 1) of the stage is done. May be called from any thread, often.
@@ -180,6 +202,10 @@ impl Shared {
         let pixels_total = now.pixels_total.max(1) as f64;
         let (share, before) = match now.stage {
             Stage::Render => (pixels as f64 / pixels_total, now.pixels as f64 / pixels_total),
+            Stage::Measure => {
+                let part = ((pixels - now.pixels) as f64 / pixels_total).min(1.0);
+                (now.shares.0 + part * (now.shares.1 - now.shares.0), 0.0)
+            }
             _ => (self.billionths.load(Relaxed) as f64 / 1e9, 0.0),
         };
         View {
@@ -309,6 +335,11 @@ mod tests {
         control.rays.store(1_000_000, Relaxed);
         let shown = view();
         assert!((shown.share - 0.75).abs() < 1e-8 && shown.mrays_per_s > 0.0);
+        progress.measure(0.5, 0.7, 100);
+        control.pixels.store(200, Relaxed);
+        assert!((view().share - 0.6).abs() < 1e-8);
+        control.pixels.store(900, Relaxed);
+        assert!((view().share - 0.7).abs() < 1e-8, "a picture that is rendered again adds nothing");
         let json = shown.json();
         assert_eq!(json["stage"], "render");
         assert_eq!(json["rays"], 1_000_000);

@@ -8,7 +8,7 @@ use super::message::Messages;
 use super::notice::Notice;
 use super::plan::{Input, Plan};
 use super::progress::{Progress, Stage};
-use super::report::Report;
+use super::report::{Report, certificate};
 use super::settings::Settings;
 use super::signals::Signals;
 use super::target::{Output, Target};
@@ -21,7 +21,7 @@ use tison::backend::{self, AnyBackend, BackendKind, BuildOptions};
 use tison::film::{self, Display, Film, Notes, Tonemap};
 use tison::math::{Filter, Sampler};
 use tison::metrics::Difference;
-use tison::render::{self, Control, Job, Outcome, RenderStats};
+use tison::render::{self, Adapted, Control, Job, Outcome, RenderStats, Stop};
 use tison::scene::format::Override;
 use tison::scene::obj::Reader;
 use tison::scene::{self, CameraDesc, Light, LoadOptions, Loaded, Scene};
@@ -31,7 +31,7 @@ pub fn render(plan: &Plan, messages: &Messages) -> Result<Exit, Failure> {
     let started = Instant::now();
     if !plan.print_config {
         if let Some(frame) = plan.known_frame()? {
-            limits::check(&frame, &plan.aovs)?;
+            limits::check(&frame, &plan.aovs, plan.picture.is_adaptive())?;
         }
         plan.check_targets()?;
     }
@@ -102,6 +102,8 @@ struct Part<'a> {
     film: &'a Film,
     /// What 8-bit formats show.
     shown: &'a Film,
+    /// What is known of its error.
+    error: Option<&'a RenderStats>,
 }
 
 /// A scene that has been read, and how it is to be rendered.
@@ -119,7 +121,7 @@ impl Run<'_> {
         let mut done = Done::default();
         let mut ready = timed(&mut done.seconds.read, || self.read())?;
         let frame = Frame { size: ready.settings.job.size, crop: ready.settings.job.crop, pixel: None };
-        limits::check(&frame, &self.plan.aovs)?;
+        limits::check(&frame, &self.plan.aovs, self.plan.picture.is_adaptive())?;
         self.plan.check_read(&ready.loaded.files)?;
         done.warnings = ready.warnings;
         done.seconds.textures = ready.loaded.texture_seconds.min(done.seconds.read);
@@ -175,7 +177,7 @@ impl Run<'_> {
             return Ok(());
         }
         let display = Display { depth_range: camera.clip, ..ready.settings.display };
-        let part = Part { frame, name: "", film: &outcome.film, shown: &outcome.film };
+        let part = Part { frame, name: "", film: &outcome.film, shown: &outcome.film, error: Some(&outcome.stats) };
         self.write(part, &display, (ready, &backends[0]), done)?;
         match (backends.get(1), &mut done.comparison) {
             (Some(second), Some(comparison)) => {
@@ -203,7 +205,7 @@ impl Run<'_> {
             return Ok(());
         }
         let display = Display { depth_range: camera.clip, ..ready.settings.display };
-        let part = Part { frame, name: both::NATIVE, film: &film, shown: &film };
+        let part = Part { frame, name: both::NATIVE, film: &film, shown: &film, error: Some(&stats) };
         self.write(part, &display, (ready, backend), done)?;
         if !(first.is_complete() && film.is_complete()) {
             return Ok(());
@@ -213,7 +215,7 @@ impl Run<'_> {
         if let Some(comparison) = &mut done.comparison {
             comparison.add(&difference, scale);
         }
-        let part = Part { frame, name: both::DIFF, film: &difference.image, shown: &shown };
+        let part = Part { frame, name: both::DIFF, film: &difference.image, shown: &shown, error: None };
         self.write(part, &Display::default(), (ready, backend), done)
     }
 
@@ -231,7 +233,10 @@ impl Run<'_> {
         done: &mut Done,
     ) -> Result<(), Failure> {
         self.progress.stage(Stage::Write);
-        let notes = notes(self.plan, &ready.settings, backend);
+        let notes = Notes {
+            error: part.error.map_or(String::new(), certificate),
+            ..notes(self.plan, &ready.settings, backend)
+        };
         timed(&mut done.seconds.write, || self.save(part, display, &notes, &mut done.written))
     }
 
@@ -388,6 +393,11 @@ fn notes(plan: &Plan, settings: &Settings, backend: &AnyBackend) -> Notes {
         0.0 => String::new(),
         ev => format!(", exposure {ev}"),
     };
+    let stop = match job.stop {
+        Stop::Count => String::new(),
+        Stop::Noise(threshold) => format!(" at most, adaptive {threshold}"),
+        Stop::Rmse(target) => format!(" at most, target error {target}"),
+    };
     let sampler = match job.sampler {
         Sampler::Sobol => String::new(),
         other => format!(", sampler {}", other.name()),
@@ -401,9 +411,10 @@ fn notes(plan: &Plan, settings: &Settings, backend: &AnyBackend) -> Notes {
         software: format!("tison {}", *VERSION),
         title: name.to_string_lossy().into_owned(),
         comment: format!(
-            "{}x{}, spp {}, seed {}, backend {backend}{sampler}{filter}{curve}{exposure}",
+            "{}x{}, spp {}{stop}, seed {}, backend {backend}{sampler}{filter}{curve}{exposure}",
             job.size.0, job.size.1, job.spp, job.seed
         ),
+        error: String::new(),
     }
 }
 
@@ -429,6 +440,10 @@ pub fn build_failure(e: &backend::Error) -> Failure {
 /// Adds frame number `index` to what came before.
 fn merge(all: &mut RenderStats, one: &RenderStats, index: u32) {
     all.seconds += one.seconds;
+    all.samples += one.samples;
+    all.rays_for_estimate += one.rays_for_estimate;
+    all.sampling_rmse = root_mean_square(all.sampling_rmse, one.sampling_rmse, index);
+    all.adapted = one.adapted.map(|one| after(all.adapted, one));
     all.rays.camera += one.rays.camera;
     all.rays.shadow += one.rays.shadow;
     all.rays.reflected += one.rays.reflected;
@@ -439,6 +454,18 @@ fn merge(all: &mut RenderStats, one: &RenderStats, index: u32) {
     all.non_finite_samples += one.non_finite_samples;
     all.shadow_rays_facing_away += one.shadow_rays_facing_away;
     all.branches_below_cut += one.branches_below_cut;
+}
+
+/// Of frame number `index` and those before it.
+fn root_mean_square(all: Option<f64>, one: Option<f64>, index: u32) -> Option<f64> {
+    let (before, one) = (all.unwrap_or(0.0).powi(2), one?.powi(2));
+    Some((before + (one - before) / f64::from(index + 1)).sqrt())
+}
+
+/// The last frame says why it ended.
+fn after(all: Option<Adapted>, one: Adapted) -> Adapted {
+    let Some(all) = all else { return one };
+    Adapted { rounds: all.rounds + one.rounds, ended: one.ended, stopped_early: all.stopped_early + one.stopped_early }
 }
 
 fn timed<T>(seconds: &mut f64, f: impl FnOnce() -> T) -> T {

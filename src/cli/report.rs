@@ -11,6 +11,7 @@ use super::target::Target;
 use super::{output, stats, system};
 use tison::backend::AnyBackend;
 use tison::film;
+use tison::render::{Adapted, Ended, RenderStats, Stop};
 use tison::scene::{CameraDesc, Projection, SceneCounts, Unused};
 
 /// The story of a run.
@@ -94,6 +95,7 @@ impl<'a> Report<'a> {
     fn lines(&self) -> Vec<String> {
         let mut lines = vec![self.input_line(), self.backend_line(), self.image_line(), self.rays_line()];
         lines.push(self.time_line());
+        lines.extend(self.adapted_line());
         lines.extend(self.done.comparison.iter().flat_map(Comparison::lines));
         if self.plan.verbose {
             lines.push(self.camera_line());
@@ -143,9 +145,41 @@ impl<'a> Report<'a> {
         let frames =
             self.plan.camera.turntable.map_or(String::new(), |n| format!(", {}", counted(u64::from(n), "frame")));
         let (spp, seed) = (self.settings.job.spp, self.settings.job.seed);
-        let samples = counted(u64::from(spp), "sample");
-        let hint = if spp.is_power_of_two() { "" } else { " (a power of two is spread better)" };
-        format!("image     {width}x{height}, {samples} a pixel{hint}, seed {seed}{frames}")
+        let samples = match self.done.stats.adapted {
+            Some(_) => {
+                format!("{:.1} samples a pixel on average, at most {}", self.spp_mean(), grouped(u64::from(spp)))
+            }
+            None => {
+                let hint = if spp.is_power_of_two() { "" } else { " (a power of two is spread better)" };
+                format!("{} a pixel{hint}", counted(u64::from(spp), "sample"))
+            }
+        };
+        format!("image     {width}x{height}, {samples}, seed {seed}{frames}")
+    }
+
+    /// Samples per pixel, over all pixels of all frames.
+    pub fn spp_mean(&self) -> f64 {
+        self.done.stats.samples as f64 / self.pixels() as f64
+    }
+
+    /// Why an adaptive render ended.
+    fn adapted_line(&self) -> Option<String> {
+        let (stats, job) = (&self.done.stats, &self.settings.job);
+        let Adapted { rounds, ended, stopped_early } = stats.adapted?;
+        let limit = job.time_limit.map_or(0.0, |limit| limit.as_secs_f64());
+        let why = match (ended, job.stop) {
+            (Ended::Enough, Stop::Rmse(target)) => format!("the error is at most {target}"),
+            (Ended::Enough, _) => "every pixel is clean enough".into(),
+            (Ended::Most, _) => format!("{} samples are the most a pixel may get", grouped(u64::from(job.spp))),
+            (Ended::Time, _) => format!("{limit} seconds are over"),
+            (Ended::Stopped, _) => "stopped".into(),
+        };
+        let rounds = counted(u64::from(rounds), "round");
+        Some(format!(
+            "adaptive  {rounds}, {} of {} pixels early; ended as {why}",
+            grouped(stopped_early),
+            grouped(self.pixels())
+        ))
     }
 
     fn rays_line(&self) -> String {
@@ -208,14 +242,19 @@ impl<'a> Report<'a> {
     }
 
     fn error_line(&self) -> String {
-        let s = &self.done.stats;
-        let cut = if s.cut_off_max == 0.0 {
-            "nothing cut off".into()
-        } else if s.cut_off_is_estimate {
-            format!("cut-off estimated to add {:.2e} to a pixel, {:.2e} on average", s.cut_off_max, s.cut_off_mean)
-        } else {
-            format!("cut-off adds at most {:.2e} to a pixel, {:.2e} on average", s.cut_off_max, s.cut_off_mean)
-        };
-        format!("error     {cut}; {}", counted(s.non_finite_samples, "non-finite sample"))
+        format!("error     {}", certificate(&self.done.stats))
     }
+}
+
+/// What is known of how wrong the picture can be.
+pub fn certificate(s: &RenderStats) -> String {
+    let cut = if s.cut_off_max == 0.0 {
+        "nothing cut off".into()
+    } else if s.cut_off_is_estimate {
+        format!("cut-off estimated to add {:.2e} to a pixel, {:.2e} on average", s.cut_off_max, s.cut_off_mean)
+    } else {
+        format!("cut-off adds at most {:.2e} to a pixel, {:.2e} on average", s.cut_off_max, s.cut_off_mean)
+    };
+    let sampling = s.sampling_rmse.map_or(String::new(), |rmse| format!("; sampling about {rmse:.2e} RMSE"));
+    format!("{cut}{sampling}; {}", counted(s.non_finite_samples, "non-finite sample"))
 }

@@ -7,7 +7,7 @@ use super::plan::{Input, Plan};
 use std::fmt;
 use tison::film::{Display, Tonemap};
 use tison::math::{Filter, Sampler};
-use tison::render::Job;
+use tison::render::{Job, Stop};
 use tison::scene::desc::{LensSampler, RenderDesc};
 
 /// Who says what a setting is.
@@ -61,6 +61,8 @@ pub const SIZE: (u64, u64) = (1280, 720);
 const RECURSION: u32 = 8;
 const SPP_OF_A_MESH: u32 = 1;
 const SPP_OF_A_SCENE: u32 = 16;
+/// Samples that a pixel gets at most where something else says when it is enough.
+const MOST_SPP: u32 = 1 << 16;
 const MIN_WEIGHT: f32 = 1.0 / 1024.0;
 /// The whole pixel.
 const JITTER_RADIUS: f64 = 0.5;
@@ -77,7 +79,11 @@ impl Settings {
             Input::Mesh => SPP_OF_A_MESH,
             Input::Scene => SPP_OF_A_SCENE,
         };
-        let spp = all.choose("spp", "render.samples", flags.spp, render.samples, spp);
+        let spp = match flags.stops_by_itself() {
+            true => all.choose("spp", "render.samples", flags.spp, None, MOST_SPP),
+            false => all.choose("spp", "render.samples", flags.spp, render.samples, spp),
+        };
+        let stop = all.stop(flags);
         let k_max = all.choose("recursion", "render.recursion", flags.recursion, render.recursion, RECURSION);
         let min_weight = all.choose("min-weight", "render.min_weight", flags.min_weight, render.min_weight, MIN_WEIGHT);
         let seed = all.choose("seed", "render.seed", flags.seed, render.seed, 0);
@@ -95,10 +101,14 @@ impl Settings {
         let tonemap = all.tonemap(flags, course);
         let exposure = all.choose("exposure", "", flags.exposure, None, 0.0);
         all.switch("centre", flags.centre);
+        all.switch("no-error-estimate", flags.no_error_estimate);
         let job = Job {
             size: frame.size,
             crop: frame.crop,
             spp,
+            stop,
+            time_limit: flags.time_limit,
+            estimate: spp > 1 && !flags.no_error_estimate,
             seed,
             k_max,
             min_weight,
@@ -123,6 +133,15 @@ impl Settings {
                 None => format!("--centre is for one sample a pixel, but there are {}; add --spp 1", self.job.spp),
             };
             return Err(Failure::usage(what).help("several samples are spread over the pixel in any case"));
+        }
+        if matches!(self.job.stop, Stop::Noise(_)) && self.job.spp <= Job::FIRST_SPP {
+            let (first, spp) = (Job::FIRST_SPP, self.job.spp);
+            let what = format!("--adaptive changes nothing: {first} samples come first, and --spp is {spp}");
+            return Err(Failure::usage(what).help("name the most that a pixel may get, like --spp 256"));
+        }
+        if self.job.sampler == Sampler::Stratified && self.job.is_adaptive() {
+            let what = "the sampler stratified has to know the number of samples, which is to be found here";
+            return Err(Failure::usage(what).help("use --sampler sobol or random, or a plain --spp"));
         }
         if flags.exposure.is_some() && self.display.tonemap == Tonemap::Stretch {
             return Err(Failure::usage("--exposure changes nothing where the image is stretched to its own range")
@@ -165,6 +184,21 @@ impl Choices<'_> {
             self.list.push(Setting { name: "scale", value: scale.to_string(), origin: Origin::Flag });
         }
         value
+    }
+
+    /// When pixels have enough samples.
+    fn stop(&mut self, flags: &PictureArgs) -> Stop {
+        let given = |name, value: Option<f64>| {
+            value.map(|value| Setting { name, value: value.to_string(), origin: Origin::Flag })
+        };
+        self.list.extend(given("adaptive", flags.adaptive));
+        self.list.extend(given("target-error", flags.target_error));
+        self.list.extend(given("time-limit", flags.time_limit.map(|limit| limit.as_secs_f64())));
+        match (flags.adaptive, flags.target_error) {
+            (Some(threshold), _) => Stop::Noise(threshold),
+            (None, Some(target)) => Stop::Rmse(target),
+            (None, None) => Stop::Count,
+        }
     }
 
     /// A choice that is shown by its name; `said` is what the flag and the scene say.

@@ -4,6 +4,7 @@ use super::EMBREE;
 use super::both::Comparison;
 use super::report::Report;
 use serde_json::{Map, Value, json};
+use tison::render::{Adapted, Ended};
 use tison::scene::SceneCounts;
 
 /// Why something was not done.
@@ -38,6 +39,7 @@ pub fn skipped(report: &Report<'_>) -> Vec<(&'static str, Skipped)> {
         ("lights_without_power", unused.lights as u64),
         ("shadow_rays_facing_away", report.done.stats.shadow_rays_facing_away),
         ("branches_below_cut", report.done.stats.branches_below_cut),
+        ("pixels_that_need_no_more", report.done.stats.adapted.map_or(0, |a| a.stopped_early)),
     ];
     let counts = counts.into_iter().filter(|&(_, n)| n > 0).map(|(name, n)| (name, Skipped::Count(n)));
     unneeded.chain(not_drawn(report)).chain(kinds_without(&report.counts)).chain(counts).collect()
@@ -84,6 +86,16 @@ pub fn scene_json(c: &SceneCounts) -> Value {
     })
 }
 
+fn adaptive(a: Adapted) -> Value {
+    let ended = match a.ended {
+        Ended::Enough => "enough",
+        Ended::Most => "most samples",
+        Ended::Time => "time",
+        Ended::Stopped => "stopped",
+    };
+    json!({ "rounds": a.rounds, "ended": ended, "pixels_stopped_early": a.stopped_early })
+}
+
 /// All figures of a run.
 pub fn json(report: &Report<'_>) -> Value {
     let (width, height) = report.image_size();
@@ -105,7 +117,7 @@ pub fn json(report: &Report<'_>) -> Value {
         "embree": EMBREE,
         "threads": report.plan.threads,
         "image": {
-            "width": width, "height": height, "spp_mean": f64::from(report.settings.job.spp) * share,
+            "width": width, "height": height, "spp_mean": report.spp_mean(),
             "frames": report.plan.camera.turntable.unwrap_or(1), "finished": share,
         },
         "scene": scene_json(&report.counts),
@@ -115,7 +127,9 @@ pub fn json(report: &Report<'_>) -> Value {
         },
         "rays": {
             "camera": rays.camera, "shadow": rays.shadow, "reflected": rays.reflected, "refracted": rays.refracted,
+            "for_error_estimate": stats.rays_for_estimate,
         },
+        "adaptive": stats.adapted.map(adaptive),
         "mrays_per_s": report.mrays_per_s(),
         "peak_rss_bytes": report.peak_memory,
         "memory": { "scene_bytes": report.scene_bytes, "backend_bytes": report.backend_bytes },
@@ -124,7 +138,7 @@ pub fn json(report: &Report<'_>) -> Value {
             "cut_off_max": stats.cut_off_max,
             "cut_off_mean": stats.cut_off_mean,
             "cut_off_is_estimate": stats.cut_off_is_estimate,
-            "sampling_rmse_estimate": Value::Null,
+            "sampling_rmse_estimate": stats.sampling_rmse,
             "non_finite_samples": stats.non_finite_samples,
         },
         "warnings": report.done.warnings,

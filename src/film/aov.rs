@@ -17,11 +17,14 @@ pub enum Aov {
     Hits,
     /// Rays traced for the pixel, of all kinds.
     Cost,
+    /// Samples taken of the pixel.
+    Samples,
 }
 
 impl Aov {
     /// All of them.
-    pub const ALL: [Self; 6] = [Self::Depth, Self::Normal, Self::Albedo, Self::Id, Self::Hits, Self::Cost];
+    pub const ALL: [Self; 7] =
+        [Self::Depth, Self::Normal, Self::Albedo, Self::Id, Self::Hits, Self::Cost, Self::Samples];
 
     /// The name on the command line and in file names.
     #[must_use]
@@ -33,6 +36,7 @@ impl Aov {
             Self::Id => "id",
             Self::Hits => "hits",
             Self::Cost => "cost",
+            Self::Samples => "samples",
         }
     }
 
@@ -40,7 +44,7 @@ impl Aov {
     #[must_use]
     pub fn channels(self) -> usize {
         match self {
-            Self::Depth | Self::Hits | Self::Cost => 1,
+            Self::Depth | Self::Hits | Self::Cost | Self::Samples => 1,
             Self::Id => 2,
             Self::Normal | Self::Albedo => 3,
         }

@@ -12,6 +12,7 @@ pub use filter::Filter;
 pub use frame::Frame;
 pub use pow::pow01;
 pub use random::Random;
+pub(crate) use sampling::hash;
 pub use sampling::{
     Branch, PixelSamples, Sampler, Sampling, concentric_disc, polar_disc, rejection_disc, uniform_radius_disc,
 };

@@ -62,6 +62,12 @@ impl Sampling {
         Self { sampler, seed: hash(seed), in_pixel, at_light }
     }
 
+    /// The same kind of points, scrambled or drawn independently.
+    #[must_use]
+    pub fn with_seed(self, seed: u32) -> Self {
+        Self { seed: hash(seed), ..self }
+    }
+
     /// The points of pixel `(x, y)`.
     #[inline]
     #[must_use]
@@ -177,7 +183,7 @@ impl Branch {
 
 /// A bijective 32-bit hash ("lowbias32" of C. Wellons' hash prospector).
 #[must_use]
-fn hash(mut x: u32) -> u32 {
+pub fn hash(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7feb_352d);
     x ^= x >> 15;

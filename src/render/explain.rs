@@ -66,8 +66,9 @@ impl<B: Backend> Teller<'_, B> {
     fn tell(&self, camera: &CameraDesc, x: u32, y: u32) -> Result<String, String> {
         let camera = camera.prepare(&self.scene.frame, self.job.size)?;
         let mut batch = PacketBatch::default();
-        let segment = Segment { pixels: &[(x, y)], first: 0, samples: 1 };
-        segment.camera_rays(&camera, self.job, &self.job.sampling(), &mut batch);
+        let sampling = self.job.sampling();
+        let segment = Segment { pixels: &[(x, y)], first: 0, samples: 1, sampling: &sampling };
+        segment.camera_rays(&camera, self.job, &mut batch);
         let ray = batch.packets()[0].ray.get(0);
         let mut told = Told {
             segment,
@@ -79,9 +80,7 @@ impl<B: Backend> Teller<'_, B> {
         };
         let mut out = format!("pixel {x},{y}\n");
         if self.job.has_negative_samples() {
-            let sampling = self.job.sampling();
-            let mean = told.segment.mean_weight(0, self.job, &sampling);
-            let weight = told.segment.weight(0, mean, self.job, &sampling);
+            let weight = told.segment.weight(0, self.job);
             writeln!(out, "filter {}: the sample counts {weight:.6}", self.job.filter.name())
                 .expect("a string takes everything");
         }
@@ -157,8 +156,7 @@ impl<B: Backend> Teller<'_, B> {
     /// Tells about one light and returns what it adds.
     fn light(&self, index: u32, light: &Light, block: &mut Block, indent: &str, told: &mut Told<'_>) -> Vec3 {
         let rounds = if light.radius > 0.0 { self.job.light_samples.max(1) } else { 1 };
-        let sampling = self.job.sampling();
-        let (samples, sample) = told.segment.samples_of(0, &sampling);
+        let (samples, sample) = told.segment.samples_of(0);
         let (mut sent, mut away, mut through) = (0, 0, 0.0);
         for round in 0..rounds {
             let mut batch = PacketBatch::<RayPacket>::default();

@@ -1,9 +1,11 @@
 //! What is to be rendered, how a run is watched and stopped, and what it tells afterwards.
 
+use super::adapt;
 use crate::film::{Aov, Film};
 use crate::math::{Filter, Sampler, Sampling};
 use crate::scene::desc::LensSampler;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::time::Duration;
 
 /// Pixels `x0 <= x < x1`, `y0 <= y < y1` of the whole image, counted from the top left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,8 +24,14 @@ pub struct Job {
     pub size: (u32, u32),
     /// The part to render; the film has just this part.
     pub crop: Crop,
-    /// Samples per pixel, at least 1.
+    /// Samples per pixel, at least 1; the most that a pixel gets if there is something else to stop at.
     pub spp: u32,
+    /// What else to stop at.
+    pub stop: Stop,
+    /// Stop after so long, once every pixel has a sample.
+    pub time_limit: Option<Duration>,
+    /// Estimate the error of sampling: some pixels are sampled twice.
+    pub estimate: bool,
     /// Chooses the samples; the same seed gives the same bytes.
     pub seed: u32,
     /// Most reflections and refractions in a row.
@@ -56,6 +64,9 @@ impl Job {
             size,
             crop: Crop { x0: 0, y0: 0, x1: size.0, y1: size.1 },
             spp: 1,
+            stop: Stop::Count,
+            time_limit: None,
+            estimate: false,
             seed: 0,
             k_max: 8,
             min_weight: 0.0,
@@ -85,11 +96,47 @@ impl Job {
         self.spp > 1 && self.filter.has_negative_lobes()
     }
 
+    /// Samples that every pixel gets before any is found to have enough; a time limit may leave it fewer.
+    pub const FIRST_SPP: u32 = adapt::FIRST;
+
     /// Where its samples lie.
     #[must_use]
     pub fn sampling(&self) -> Sampling {
         Sampling::new(self.sampler, self.seed, self.spp, self.light_samples.max(1))
     }
+
+    /// Whether pixels may get different numbers of samples.
+    #[must_use]
+    pub fn is_adaptive(&self) -> bool {
+        self.stop != Stop::Count || self.time_limit.is_some()
+    }
+}
+
+impl Crop {
+    /// Number of pixels.
+    #[must_use]
+    pub fn pixels(&self) -> u64 {
+        u64::from(self.x1 - self.x0) * u64::from(self.y1 - self.y0)
+    }
+
+    /// Place of a pixel of the whole image in this part of it, row by row.
+    #[must_use]
+    pub fn index(&self, (x, y): (u32, u32)) -> usize {
+        (y - self.y0) as usize * (self.x1 - self.x0) as usize + (x - self.x0) as usize
+    }
+}
+
+/// When there are enough samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Stop {
+    /// When every pixel has as many as the job says.
+    #[default]
+    Count,
+    /// A pixel is done when its standard error, as if its samples were independent, is below this share of the root of its
+    /// light, and that of its neighbours too.
+    Noise(f64),
+    /// When the root mean square error of the image, over pixels and channels, linear, is estimated to be at most this.
+    Rmse(f64),
 }
 
 /// Shared with whoever watches a render: progress out, cancellation in.
@@ -134,8 +181,16 @@ impl RayCounts {
 pub struct RenderStats {
     /// Wall time of the render loop.
     pub seconds: f64,
-    /// Rays traced.
+    /// Rays traced for the image.
     pub rays: RayCounts,
+    /// Rays traced for the estimate of the error alone, of all kinds.
+    pub rays_for_estimate: u64,
+    /// Samples taken, of all pixels together.
+    pub samples: u64,
+    /// Estimate of the root mean square error of sampling, over pixels and channels, linear; if it was asked for.
+    pub sampling_rmse: Option<f64>,
+    /// How an adaptive render went.
+    pub adapted: Option<Adapted>,
     /// Largest bound of any pixel on what branches below the weight cut or beyond `k_max` could add, linear.
     pub cut_off_max: f64,
     /// Mean of the same over all pixels.
@@ -149,6 +204,30 @@ pub struct RenderStats {
     pub shadow_rays_facing_away: u64,
     /// Branches below the weight cut.
     pub branches_below_cut: u64,
+}
+
+/// How an adaptive render went.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Adapted {
+    /// Rounds of sampling.
+    pub rounds: u32,
+    /// Why there was no further one.
+    pub ended: Ended,
+    /// Pixels that did not get the most samples a pixel may get.
+    pub stopped_early: u64,
+}
+
+/// Why a render ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// What was asked for is reached.
+    Enough,
+    /// Every pixel that should go on has the most samples it may get.
+    Most,
+    /// The time was over.
+    Time,
+    /// Somebody asked to stop.
+    Stopped,
 }
 
 /// An image and its story.

@@ -7,6 +7,7 @@ use crate::scene::desc::LensSampler;
 use crate::scene::{Camera, CameraRays};
 use crate::simd;
 use glam::DVec2;
+use std::ops::Range;
 
 /// Pixels along the side of a tile.
 pub const TILE: u32 = 32;
@@ -68,70 +69,60 @@ pub struct Segment<'a> {
     pub first: u32,
     /// Samples of each pixel.
     pub samples: u32,
+    /// Where they lie.
+    pub sampling: &'a Sampling,
 }
 
-/// Splits the work of a tile into segments; all samples of a pixel come in order.
-pub fn segments(pixels: &[(u32, u32)], spp: u32) -> impl Iterator<Item = Segment<'_>> {
-    let samples = spp.min(LANES as u32);
+/// Splits samples `range` of all pixels into segments; all samples of a pixel come in order.
+pub fn segments<'a>(
+    pixels: &'a [(u32, u32)],
+    range: Range<u32>,
+    sampling: &'a Sampling,
+) -> impl Iterator<Item = Segment<'a>> {
+    let samples = (range.end - range.start).min(LANES as u32);
     let at_once = SEGMENT / samples as usize;
     pixels.chunks(at_once).flat_map(move |pixels| {
-        (0..spp).step_by(samples as usize).map(move |first| Segment {
+        range.clone().step_by(samples as usize).map(move |first| Segment {
             pixels,
             first,
-            samples: samples.min(spp - first),
+            samples: samples.min(range.end - first),
+            sampling,
         })
     })
 }
 
-impl Segment<'_> {
+impl<'a> Segment<'a> {
     /// The sample points of the pixel that ray `slot` of the segment goes through, and which of
     /// them is the ray's.
     #[must_use]
-    pub fn samples_of<'s>(&self, slot: u32, sampling: &'s Sampling) -> (PixelSamples<'s>, u32) {
+    pub fn samples_of(&self, slot: u32) -> (PixelSamples<'a>, u32) {
         let (x, y) = self.pixels[(slot / self.samples) as usize];
-        (sampling.pixel(x, y), self.first + slot % self.samples)
+        (self.sampling.pixel(x, y), self.first + slot % self.samples)
     }
 
-    /// Mean of the filter's weights over all samples of pixel number `pixel`.
+    /// What the sample of ray `slot` counts in its pixel: [`Filter::weight`](crate::math::Filter::weight).
     #[must_use]
-    pub fn mean_weight(&self, pixel: usize, job: &Job, sampling: &Sampling) -> f64 {
-        let (x, y) = self.pixels[pixel];
-        let samples = sampling.pixel(x, y);
-        (0..job.spp).map(|sample| filter_weight(job, samples, sample)).sum::<f64>() / f64::from(job.spp)
-    }
-
-    /// What the sample of ray `slot` counts in its pixel, whose [`mean_weight`](Self::mean_weight) is `mean`.
-    ///
-    /// That is the filter's weight, moved so that the mean of all is 1: a flat area stays flat, where the weights alone
-    /// would make it noisy. What that adds to the expected value falls with the number of samples. It is the control
-    /// variate `weight - 1`, with the mean of the colours as its coefficient.
-    #[must_use]
-    pub fn weight(&self, slot: u32, mean: f64, job: &Job, sampling: &Sampling) -> f64 {
-        let (samples, sample) = self.samples_of(slot, sampling);
-        1.0 + (filter_weight(job, samples, sample) - mean)
+    pub fn weight(&self, slot: u32, job: &Job) -> f64 {
+        let (samples, sample) = self.samples_of(slot);
+        let [a, b, ..] = samples.point(sample);
+        job.filter.weight(job.offset(a), job.offset(b))
     }
 
     /// Fills `batch` with the camera rays.
-    pub fn camera_rays(&self, camera: &Camera, job: &Job, sampling: &Sampling, batch: &mut PacketBatch<RayHitPacket>) {
+    pub fn camera_rays(&self, camera: &Camera, job: &Job, batch: &mut PacketBatch<RayHitPacket>) {
         batch.resize(self.pixels.len() * self.samples as usize);
         let samples = self.first..self.first + self.samples;
         let mut points = self.pixels.iter().flat_map(|&pixel| samples.clone().map(move |sample| (pixel, sample)));
         let (mut at, mut lens) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
         for (packet, live) in batch.packets_mut() {
             for (lane, (pixel, sample)) in points.by_ref().take(live).enumerate() {
-                let (x, y, disc) = image_point(camera, job, sampling, pixel, sample);
+                let (x, y, disc) = image_point(camera, job, self.sampling, pixel, sample);
                 (at[0][lane], at[1][lane]) = (x, y);
                 (lens[0][lane], lens[1][lane]) = (disc.x, disc.y);
             }
             simd::run(CameraRays { camera, at: &at, lens: &lens, packet: &mut packet.ray });
         }
     }
-}
-
-/// See [`Filter::weight`](crate::math::Filter::weight).
-fn filter_weight(job: &Job, samples: PixelSamples<'_>, sample: u32) -> f64 {
-    let [a, b, ..] = samples.point(sample);
-    job.filter.weight(job.offset(a), job.offset(b))
 }
 
 /// Where sample `sample` of `pixel` goes through the image, in pixels, and through the unit lens.
@@ -205,11 +196,12 @@ mod tests {
     #[test]
     fn segments_hold_every_sample_once_and_in_order() {
         let all = pixels_of(tiles(CROP)[0]);
+        let sampling = Job::whole((100, 100)).sampling();
         for spp in [1, 2, 5, 16, 17, 70] {
             let mut next = vec![0; all.len()];
             let mut at = std::collections::HashMap::new();
             at.extend(all.iter().enumerate().map(|(i, &p)| (p, i)));
-            for s in segments(&all, spp) {
+            for s in segments(&all, 0..spp, &sampling) {
                 assert!((1..=SEGMENT).contains(&(s.pixels.len() * s.samples as usize)));
                 for p in s.pixels {
                     assert_eq!(next[at[p]], s.first, "spp {spp}");

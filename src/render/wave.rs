@@ -16,7 +16,6 @@ use super::tile::Segment;
 use crate::backend::Backend;
 use crate::film::Aov;
 use crate::geom::{Coherence, INVALID_ID, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
-use crate::math::Sampling;
 use crate::scene::{Camera, Light, Needs, Object, Scene};
 use glam::{DVec3, Vec3};
 
@@ -38,7 +37,7 @@ struct Waiting {
 /// What the rays of a segment gather, one entry per sample.
 #[derive(Debug, Default)]
 pub struct Gathered {
-    /// Linear RGB, times the weight of the pixel filter.
+    /// Linear RGB.
     pub color: Vec<DVec3>,
     /// Bound on what was left out by the weight cut and `k_max`, linear: `(fixed, scaled)` as in [`Bound`].
     pub cut: Vec<[f64; 2]>,
@@ -57,6 +56,8 @@ pub struct Tally {
     pub facing_away: u64,
     /// Branches below the weight cut.
     pub below_cut: u64,
+    /// Rays of all kinds that were sent to compare with, and are not counted above.
+    pub again: u64,
     /// Largest answer of a surface to all lights; kept only where a bound needs it.
     pub brightest: f32,
 }
@@ -75,10 +76,6 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
     /// Where highlights are seen from at every depth; `None`: from where each ray came.
     seen_from: Option<DVec3>,
     clip: Option<(f64, f64)>,
-    /// Where samples lie.
-    pub sampling: Sampling,
-    /// Of the pixels of the current segment, where the filter has negative lobes.
-    mean_weights: Vec<f64>,
     palette: Palette,
     /// Of each material: whether it sends rays on.
     branching: Vec<bool>,
@@ -119,7 +116,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         contacts: &'a Contacts,
     ) -> Self {
         let cost = job.aovs.contains(&Aov::Cost).then(Vec::new);
-        let seen = job.aovs.iter().any(|&a| a != Aov::Cost).then(Vec::new);
+        let seen = job.aovs.iter().any(|&a| !matches!(a, Aov::Cost | Aov::Samples)).then(Vec::new);
         let lights = scene.lights.iter().filter(|l| needs.shadow_rays && l.color != Vec3::ZERO);
         let is_shapes: Vec<bool> = scene.objects.iter().map(|o| matches!(o, Object::Shapes(_))).collect();
         Self {
@@ -131,8 +128,6 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             lights: lights.copied().collect(),
             seen_from: scene.course_rules.then_some(camera.eye),
             clip: camera.clip,
-            sampling: job.sampling(),
-            mean_weights: Vec::new(),
             palette: Palette::of(scene),
             branching: scene.materials.iter().map(|m| m.reflects() || m.refracts()).collect(),
 
@@ -183,25 +178,6 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         self.shade(segment);
         if SECONDARY {
             self.secondary_waves(segment);
-        }
-        if self.job.has_negative_samples() {
-            self.weigh(segment);
-        }
-    }
-
-    /// Makes each sample count what the pixel filter says; what was left out counts as much, whatever the sign.
-    fn weigh(&mut self, segment: &Segment<'_>) {
-        if segment.first == 0 {
-            let mean = |pixel| segment.mean_weight(pixel, self.job, &self.sampling);
-            self.mean_weights = (0..segment.pixels.len()).map(mean).collect();
-        }
-        for (slot, color) in self.gathered.color.iter_mut().enumerate() {
-            let mean = self.mean_weights[slot / segment.samples as usize];
-            let weight = segment.weight(slot as u32, mean, self.job, &self.sampling);
-            *color *= weight;
-            if SECONDARY {
-                self.gathered.cut[slot] = self.gathered.cut[slot].map(|c| c * weight.abs());
-            }
         }
     }
 
@@ -364,13 +340,13 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     /// Adds one light that has a size: a batch for each of its samples, and the share of them
     /// that got through.
     fn soft_light(&mut self, index: usize, segment: &Segment<'_>) {
-        let (light, rounds, sampling) = (self.lights[index], self.job.light_samples.max(1), self.sampling);
+        let (light, rounds) = (self.lights[index], self.job.light_samples.max(1));
         self.visible.clear();
         self.visible.resize(self.used, [0.0; LANES]);
         for round in 0..rounds {
             self.send_shadow_rays(|_, block, packet| {
                 let points = lights::points_on(block, &light, |lane| {
-                    let (samples, sample) = segment.samples_of(block.slot[lane], &sampling);
+                    let (samples, sample) = segment.samples_of(block.slot[lane]);
                     let number = sample.wrapping_mul(rounds).wrapping_add(round);
                     samples.on_light(number, index as u32, block.branch[lane])
                 });

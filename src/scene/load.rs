@@ -107,6 +107,15 @@ pub fn load(path: &Path, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
     if bare { load_mesh(path, options) } else { freeze::load(path, options) }
 }
 
+/// Reads a scene that is in memory: `text` is what a file at `path` would hold. What it names is looked for as if it
+/// were there.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_text(path: &Path, text: &str, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
+    freeze::load_text(path, text.into(), options)
+}
+
 fn load_mesh(path: &Path, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
     let mut assets = Assets::new(options, Encoding::Srgb);
     let wanted = Wanted { uv: Uv::IfTextured, materials: true, v_down: false };

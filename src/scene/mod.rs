@@ -26,7 +26,7 @@ pub use error::{Error, Warning};
 pub use framing::{CameraOverrides, View};
 pub use freeze::OneShape;
 pub use light::Light;
-pub use load::{LoadOptions, Loaded, Unused, load};
+pub use load::{LoadOptions, Loaded, Unused, load, load_text};
 pub use material::{Material, Reflect, Textured};
 pub use needs::Needs;
 pub use object::{AnyShapes, Instance, Mesh, MeshData, MeshPaint, Object, Shapes};

@@ -11,7 +11,8 @@
 //! with the least height of the triangle, and by `16 · 2⁻²⁴ · longest side / height` more for what the cross product of a sliver's
 //! sides loses. Along the ray the hit is off by up to `slack / |cos|` for an angle between ray and normal whose cosine is
 //! well above `tilt`; twice that is allowed. Below `2 tilt` the ray may as well lie in the plane: its `t` is a quotient of
-//! two roundings and can be anything. A placed mesh adds what its transform rounds ([`placement`]).
+//! two roundings and can be anything. A triangle seen so obliquely, or so thin, that the ray is within the slack of the lines
+//! of two sides is not decided by its edge functions: their signs may agree beyond its end as well. A placed mesh adds what its transform rounds ([`placement`]).
 //!
 //! A shape is decided in f64 by both backends with one formula. Only boxes can lose it, and the native
 //! backend passes over what is met by less than a millionth of its size: `slack` is the same, with the farthest
@@ -39,8 +40,9 @@ pub(super) enum Side {
     Out,
     /// The ray passes the boundary, or an end of its own interval, closer than f32 can tell.
     Boundary,
-    /// The primitive holds the ray in its plane as far as f32 can tell: it is seen as a line.
-    EdgeOn,
+    /// Two of its edge functions may have either sign in f32: it is seen in line, and may be missed or reported even
+    /// where the ray passes beyond its end.
+    InLine,
 }
 
 /// A ray and a primitive.
@@ -81,6 +83,10 @@ impl Range {
 
     fn extend(&mut self, t: f64) {
         *self = Self { lo: self.lo.min(t), hi: self.hi.max(t) };
+    }
+
+    pub(super) fn is_anywhere(self) -> bool {
+        self.length() == f64::INFINITY
     }
 
     pub(super) fn length(self) -> f64 {
@@ -202,12 +208,18 @@ fn of_triangle(ray: &Ray, p: [DVec3; 3], rounding: &Rounding) -> Facts {
         let j = (i + 1) % 3;
         flat[i].perp_dot(flat[j]).abs() <= slack * (p[j] - p[i]).length()
     };
-    let in_line = edge_on && (0..3).filter(|&i| unclear(i)).count() >= 2;
-    let side = if in_line {
-        Side::EdgeOn
-    } else if inside < -1.0 || from_end < -1.0 {
+    let in_line = (0..3).filter(|&i| unclear(i)).count() >= 2;
+    let side = if in_line && edge_on {
+        Side::InLine
+    } else if from_end < -1.0 {
         Side::Out
-    } else if inside <= 1.0 || from_end <= 1.0 {
+    } else if inside.abs() <= 1.0 {
+        Side::Boundary
+    } else if in_line {
+        Side::InLine
+    } else if inside < 0.0 {
+        Side::Out
+    } else if from_end <= 1.0 {
         Side::Boundary
     } else {
         Side::In

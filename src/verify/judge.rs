@@ -79,7 +79,7 @@ impl<A: Backend, B: Backend> Judge<'_, A, B> {
         if off > slack {
             return Some(Verdict::new(Class::Normal, off / slack));
         }
-        if made > SAME_NORMAL && facts.side != Side::EdgeOn {
+        if made > SAME_NORMAL && facts.side != Side::InLine {
             return Some(Verdict::new(Class::Normal, made / SAME_NORMAL));
         }
         None
@@ -192,7 +192,7 @@ fn excuse_for(facts: &Facts) -> Option<Verdict> {
     match facts.side {
         Side::In | Side::Out => None,
         Side::Boundary => Some(Verdict::new(Class::Edge, facts.margin)),
-        Side::EdgeOn => Some(Verdict::new(Class::Grazing, facts.margin)),
+        Side::InLine => Some(Verdict::new(Class::Grazing, facts.margin)),
     }
 }
 
@@ -207,7 +207,7 @@ fn lie(hit: &Hit, facts: &Facts) -> Option<Verdict> {
 
 /// Where a reported hit may be. If that is anywhere, the report is all there is.
 fn range(hit: &Hit, facts: &Facts) -> Range {
-    if facts.side == Side::EdgeOn { Range::around(f64::from(hit.t), 0.0) } else { facts.t }
+    if facts.side == Side::InLine && facts.t.is_anywhere() { Range::around(f64::from(hit.t), 0.0) } else { facts.t }
 }
 
 /// How many times its band a `t` is off the middle of it.

@@ -111,11 +111,11 @@ fn stats_have_the_keys_that_others_read() {
     bench.expect("a.obj --size 40x30 --stats s.json -j 2", 0);
     let stats: Value = serde_json::from_slice(&bench.read("s.json")).unwrap();
     let wanted = [
-        ("", "tison backend embree threads image scene seconds rays mrays_per_s peak_rss_bytes skipped error"),
+        ("", "tison backend embree threads image scene seconds rays mrays_per_s peak_rss_bytes skipped error adaptive"),
         ("image", "width height spp_mean"),
         ("scene", "triangles degenerate spheres cubes cylinders quads instances lights materials textures"),
         ("seconds", "read textures build render write total"),
-        ("rays", "camera shadow reflected refracted"),
+        ("rays", "camera shadow reflected refracted for_error_estimate"),
         ("error", "cut_off_max cut_off_mean sampling_rmse_estimate cut_off_is_estimate non_finite_samples"),
     ];
     for (part, keys) in wanted {

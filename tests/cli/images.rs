@@ -69,7 +69,7 @@ fn a_part_is_that_part_of_the_whole() {
 #[test]
 fn auxiliary_images_stand_beside_the_image() {
     let bench = Bench::new();
-    bench.expect("a.obj --size 40x30 -o out.png --aov depth,normal,albedo,id,hits,cost", 0);
+    bench.expect("a.obj --size 40x30 -o out.png --aov depth,normal,albedo,id,hits,cost,samples", 0);
     let (_, _, depth) = decode_file(&bench.path("out.depth.png"));
     let (_, _, hits) = decode_file(&bench.path("out.hits.png"));
     assert_eq!(depth[..3], [0; 3], "the corner is background");
@@ -77,7 +77,7 @@ fn auxiliary_images_stand_beside_the_image() {
     for (d, h) in depth.iter().zip(&hits) {
         assert_eq!(*d == 0, *h == 0, "black where nothing is hit, and only there");
     }
-    for kind in ["normal", "albedo", "id", "cost"] {
+    for kind in ["normal", "albedo", "id", "cost", "samples"] {
         assert!(decode_file(&bench.path(&format!("out.{kind}.png"))).2.iter().any(|&b| b > 0), "{kind}");
     }
     bench.expect("a.obj --size 40x30 -o out.exr --aov depth,id", 0);

@@ -3,8 +3,10 @@
 mod bad_input;
 mod commands;
 mod compare;
+mod error;
 mod images;
 mod probe;
+mod sampling;
 mod scenes;
 mod signals;
 mod verify;

@@ -50,16 +50,21 @@ fn leave(process: &mut Process) -> i32 {
     }
 }
 
-/// Reads progress until some of the image is rendered; the reader must live on, or the
-/// command's messages go nowhere.
+/// Reads progress until some of the image is rendered.
 fn wait_for_pixels(process: &mut Process) -> BufReader<std::process::ChildStderr> {
+    wait_for(process, "render", 0.0)
+}
+
+/// Reads progress until more than a share of a stage is done; the reader must live on, or the
+/// command's messages go nowhere.
+fn wait_for(process: &mut Process, stage: &str, share: f64) -> BufReader<std::process::ChildStderr> {
     let mut reader = BufReader::new(process.0.stderr.take().unwrap());
     let mut line = String::new();
     loop {
         line.clear();
-        assert!(reader.read_line(&mut line).unwrap() > 0, "ended before anything was rendered");
+        assert!(reader.read_line(&mut line).unwrap() > 0, "ended before it got so far");
         let Ok(progress) = serde_json::from_str::<serde_json::Value>(&line) else { continue };
-        if progress["stage"] == "render" && progress["done"].as_f64().unwrap() > 0.0 {
+        if progress["stage"] == stage && progress["done"].as_f64().unwrap() > share {
             return reader;
         }
     }
@@ -161,4 +166,24 @@ fn stopped_while_reading_nothing_is_written() {
     assert_eq!(code, 130, "{said}");
     assert!(text(said.as_bytes()).starts_with("error: stopped before anything was rendered"), "{said}");
     assert_eq!(bench.names(), ["a.obj", "endless.obj"]);
+}
+
+#[test]
+fn a_measurement_that_is_stopped_reports_what_it_has() {
+    let bench = Bench::new();
+    let words = "bench error lens edges --only sampling --size 16x9 --seeds 1 --spp 65536 --reference 16";
+    let mut child = start(&bench, &format!("{words} --progress json --json j.json -o r.html"));
+    // Most of the work is in the last two of nine numbers of samples.
+    let mut stderr = wait_for(&mut child, "measure", 0.02);
+    signal(&child, "INT");
+    assert_eq!(leave(&mut child), 130);
+    let mut said = String::new();
+    stderr.read_to_string(&mut said).unwrap();
+    assert!(said.contains("stopped: the report has what was finished"), "{said}");
+    let json: serde_json::Value = serde_json::from_slice(&bench.read("j.json")).unwrap();
+    let points = json["sections"]["error_lens"]["data"].as_array().unwrap();
+    let most = points.iter().map(|p| p["spp"].as_f64().unwrap()).fold(0.0, f64::max);
+    assert!((64.0..65_536.0).contains(&most), "{most}");
+    assert!(json["sections"]["error_edges"].is_null(), "it did not get there");
+    assert_eq!(bench.names(), ["a.obj", "j.json", "r.html"]);
 }

@@ -107,13 +107,14 @@ fn layers_of_an_exr() {
     assert_eq!(layer("Z"), grey(Aov::Depth));
     assert_eq!(layer("hits"), grey(Aov::Hits));
     assert_eq!(layer("cost"), grey(Aov::Cost));
+    assert_eq!(layer("samples"), grey(Aov::Samples));
     for kind in [Aov::Normal, Aov::Albedo] {
         assert_eq!(layer(kind.name()).as_flattened(), aov(kind).data);
     }
     let first = |kind: Aov, channel: usize| layer(kind.name())[3][channel];
     assert_eq!([0, 1, 2].map(|c| first(Aov::Id, c)), [3.0, 1003.0, 0.0], "object, primitive, nothing");
     let said = film::read(&path, Some("albedu")).expect_err("there is none").to_string();
-    assert!(said.contains("no layer 'albedu'") && said.contains("albedo, cost, hits, id, normal"), "{said}");
+    assert!(said.contains("no layer 'albedu'") && said.contains("albedo, cost, hits, id, normal, samples"), "{said}");
     let png = folder.film("a.png", &film);
     let said = film::read(&png, Some("albedo")).expect_err("a PNG has none").to_string();
     assert!(said.contains("only EXR files have layers"), "{said}");

@@ -1,6 +1,7 @@
 //! What a renderer must get right, known beforehand: through the whole way from a scene file to
 //! pixels, by every backend.
 
+mod adaptive;
 mod edges;
 mod glass;
 mod kit;

@@ -234,6 +234,7 @@ fn save(output: &Output, story: &Story<'_>, messages: &Messages) -> Result<(Path
         software: format!("tison {}", *super::VERSION),
         title: "difference".into(),
         comment: format!("{} against {}: {shows}", story.args.a.display(), story.args.b.display()),
+        error: String::new(),
     };
     let size = film::save(path, |out| film::encode(&film, output.format, &Display::default(), &notes, out))?;
     messages.line(&format!("wrote     {} ({}): {shows}", path.display(), bytes(size)));

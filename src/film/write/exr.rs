@@ -1,11 +1,12 @@
 //! OpenEXR: every value as it is, in one part with named channels.
 //!
 //! Colours are `R G B`, depth is `Z`, as every reader expects; the others are `normal.X Y Z`,
-//! `albedo.R G B`, `id.object` and `id.primitive` (whole numbers), `hits` and `cost`.
+//! `albedo.R G B`, `id.object` and `id.primitive` (whole numbers), `hits`, `cost` and `samples`.
 
 use super::Notes;
 use crate::film::save::Sink;
 use crate::film::{Aov, AovImage};
+use exr::meta::attribute::AttributeValue;
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, Text, WritableImage,
 };
@@ -24,6 +25,7 @@ pub fn aov_channels(aov: &AovImage) -> Vec<AnyChannel<FlatSamples>> {
         Aov::Albedo => split(&aov.data, &["albedo.R", "albedo.G", "albedo.B"]),
         Aov::Hits => split(&aov.data, &["hits"]),
         Aov::Cost => split(&aov.data, &["cost"]),
+        Aov::Samples => split(&aov.data, &["samples"]),
         Aov::Id => {
             let whole = |i: usize| FlatSamples::U32(aov.data.iter().skip(i).step_by(2).map(|&v| v.to_bits()).collect());
             vec![AnyChannel::new("id.object", whole(0)), AnyChannel::new("id.primitive", whole(1))]
@@ -43,7 +45,9 @@ pub fn write(
     notes: &Notes,
     out: &mut dyn Sink,
 ) -> io::Result<()> {
+    let error = text(&notes.error).map(|error| (Text::from("error"), AttributeValue::Text(error)));
     let attributes = LayerAttributes {
+        other: error.into_iter().collect(),
         software_name: text(&notes.software),
         comments: text(&format!("{} {}", notes.title, notes.comment)),
         ..LayerAttributes::default()

@@ -24,6 +24,8 @@ pub struct Notes {
     pub title: String,
     /// Settings that the pixels depend on.
     pub comment: String,
+    /// What is known of how wrong they can be.
+    pub error: String,
 }
 
 /// The files that [`save_all`] writes: the colours first, then each auxiliary image that

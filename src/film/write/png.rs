@@ -22,7 +22,9 @@ pub fn write(
     if meaning == Meaning::Colour {
         encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
     }
-    for (keyword, text) in [("Software", &notes.software), ("Title", &notes.title), ("Comment", &notes.comment)] {
+    let texts =
+        [("Software", &notes.software), ("Title", &notes.title), ("Comment", &notes.comment), ("Error", &notes.error)];
+    for (keyword, text) in texts {
         if text.is_empty() {
             continue;
         }

@@ -26,7 +26,12 @@ fn film() -> Film {
 }
 
 fn notes() -> Notes {
-    Notes { software: "tison 0".into(), title: "Kugel ümlaut 球.obj".into(), comment: "spp 1".into() }
+    Notes {
+        software: "tison 0".into(),
+        title: "Kugel ümlaut 球.obj".into(),
+        comment: "spp 1".into(),
+        error: "0 ümlaut".into(),
+    }
 }
 
 fn encoded(film: &Film, format: Format) -> Vec<u8> {
@@ -144,6 +149,7 @@ fn exr_holds_every_value_of_every_channel() {
         "normal.X",
         "normal.Y",
         "normal.Z",
+        "samples",
     ];
     assert_eq!(names, want);
     let channel = |name: &str| &read.iter().find(|(n, _)| n == name).unwrap().1;
@@ -175,7 +181,7 @@ fn exr_channels(bytes: Vec<u8>) -> Vec<(String, Vec<f32>)> {
 fn each_auxiliary_image_has_its_own_file_unless_the_format_holds_them() {
     let dir = tempfile::tempdir().unwrap();
     let film = film();
-    for (name, count) in [("a.png", 7), ("b.pfm", 7), ("c.exr", 1), ("d.hdr", 7)] {
+    for (name, count) in [("a.png", 8), ("b.pfm", 8), ("c.exr", 1), ("d.hdr", 8)] {
         let path = dir.path().join(name);
         let format = Format::of(&path).unwrap();
         let written = save_all(&film, &path, format, &Display::default(), &notes()).unwrap();

@@ -8,6 +8,7 @@
 //! | id | a colour for each pair of object and primitive, black where nothing was hit | the same |
 //! | hits | 0 black, 1 white | share |
 //! | cost | 0 black, dearest pixel white | rays |
+//! | samples | 0 black, most white | samples |
 //!
 //! Only albedo is bent by the sRGB curve; elsewhere equal steps of the value are equal steps of the byte.
 
@@ -34,7 +35,7 @@ fn plain_bytes(aov: &AovImage) -> Vec<[u8; 3]> {
         Aov::Albedo => srgb_bytes(triples(values)),
         Aov::Id => pairs(values).iter().map(|&pair| id_colour(pair)).collect(),
         Aov::Hits => values.iter().map(|&h| [step(h); 3]).collect(),
-        Aov::Cost => {
+        Aov::Cost | Aov::Samples => {
             let most = values.iter().copied().fold(0.0, f32::max).max(f32::MIN_POSITIVE);
             values.iter().map(|&c| [step(c / most); 3]).collect()
         }
@@ -49,7 +50,7 @@ pub fn linear(aov: &AovImage) -> Vec<[f32; 3]> {
         Aov::Normal => triples(values).iter().map(|n| n.map(|c| 0.5 + 0.5 * c)).collect(),
         Aov::Albedo => triples(values).to_vec(),
         Aov::Id => pairs(values).iter().map(|&pair| id_colour(pair).map(|b| f32::from(b) / 255.0)).collect(),
-        Aov::Hits | Aov::Cost => values.iter().map(|&v| [v; 3]).collect(),
+        Aov::Hits | Aov::Cost | Aov::Samples => values.iter().map(|&v| [v; 3]).collect(),
     }
 }
 
@@ -175,7 +176,7 @@ mod tests {
                 Aov::Normal => vec![-1.0, 0.0, 1.0],
                 Aov::Albedo => vec![0.0, 0.5, 1.0],
                 Aov::Id => vec![f32::from_bits(3), f32::from_bits(u32::MAX)],
-                Aov::Hits | Aov::Cost => vec![0.0, 1.0],
+                Aov::Hits | Aov::Cost | Aov::Samples => vec![0.0, 1.0],
             };
             let shown = linear(&AovImage { kind, data });
             assert!(shown.as_flattened().iter().all(|v| v.is_finite() && *v >= 0.0), "{}", kind.name());

@@ -34,6 +34,11 @@ use std::path::Path;
 /// Reads the scene file at `path` and all that it needs.
 pub fn load(path: &Path, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
     let text = std::fs::read(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
+    load_text(path, text, options)
+}
+
+/// The same with `text` for the content of the file.
+pub fn load_text(path: &Path, text: Vec<u8>, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
     let read = format::ReadOptions { overrides: options.overrides.clone(), allow: options.allow.clone() };
     let (desc, diagnostics, mistakes) = format::parse_keeping(path, &text, &read).map_err(Error::Scene)?;
     drop(text);

@@ -1,5 +1,7 @@
 //! `bench`: how right and how fast the tracer is.
 
+mod error;
+
 use super::exit::{Exit, Failure};
 use super::message::Messages;
 use super::{output, style};
@@ -18,6 +20,9 @@ pub enum Bench {
     Stability(StabilityArgs),
     /// The native tracer against Embree: seconds to build and rays per second, by one thread and by all
     Speed(SpeedArgs),
+    /// Run time against error of pictures: who needs how many samples and seconds, and how fast the error falls
+    #[command(after_long_help = error::AFTER_HELP)]
+    Error(error::ErrorArgs),
 }
 
 /// Where what was measured goes.
@@ -29,6 +34,9 @@ pub struct ReportArgs {
     /// Write what was measured for programs; `-` is stdout, instead of the tables
     #[arg(long, value_name = "FILE.json")]
     json: Option<PathBuf>,
+    /// Write the same for spreadsheets; `-` is stdout, instead of the tables
+    #[arg(long, value_name = "FILE.csv")]
+    csv: Option<PathBuf>,
 }
 
 /// `bench stability`.
@@ -82,6 +90,7 @@ pub fn bench(what: &Bench, messages: &Messages) -> Result<Exit, Failure> {
     match what {
         Bench::Stability(args) => stability(args, messages),
         Bench::Speed(args) => speed(args, messages),
+        Bench::Error(args) => error::error(args, messages),
     }
 }
 
@@ -119,22 +128,33 @@ fn speed(args: &SpeedArgs, messages: &Messages) -> Result<Exit, Failure> {
 impl ReportArgs {
     /// Before the work is done: whether what comes of it can be written.
     fn check(&self) -> Result<(), Failure> {
-        let mut files = [&self.output, &self.json].into_iter().flatten().filter(|path| path.as_os_str() != "-");
+        let for_programs = [&self.json, &self.csv].into_iter().flatten();
+        if for_programs.clone().filter(|path| is_stdout(path)).count() > 1 {
+            return Err(Failure::usage("--json - and --csv - both want stdout").help("write one of them to a file"));
+        }
+        let mut files = for_programs.filter(|path| !is_stdout(path)).chain(&self.output);
         files.try_for_each(|path| Ok(film::check_target(path)?))
     }
 
     fn tell(&self, report: &Report, messages: &Messages) -> Result<Exit, Failure> {
-        let json = format!("{:#}\n", report.json());
         if let Some(path) = &self.output {
             write(path, &report.html(), messages)?;
         }
-        match &self.json {
-            Some(path) if path.as_os_str() == "-" => return output::print(json.as_bytes()),
-            Some(path) => write(path, &json, messages)?,
-            None => {}
+        let json = |report: &Report| format!("{:#}\n", report.json());
+        let mut instead = None;
+        for (path, text) in [(&self.json, json as fn(&Report) -> String), (&self.csv, Report::csv)] {
+            match path {
+                Some(path) if is_stdout(path) => instead = Some(text(report)),
+                Some(path) => write(path, &text(report), messages)?,
+                None => {}
+            }
         }
-        output::print(report.text().as_bytes())
+        output::print(instead.unwrap_or_else(|| report.text()).as_bytes())
     }
+}
+
+fn is_stdout(path: &Path) -> bool {
+    path.as_os_str() == "-"
 }
 
 fn write(path: &Path, text: &str, messages: &Messages) -> Result<(), Failure> {
