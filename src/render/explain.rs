@@ -79,6 +79,11 @@ impl<B: Backend> Teller<'_, B> {
             out: String::new(),
         };
         let mut out = format!("pixel {x},{y}\n");
+        if self.job.has_negative_samples() {
+            let weight = told.segment.weight(0, self.job);
+            writeln!(out, "filter {}: the sample counts {weight:.6}", self.job.filter.name())
+                .expect("a string takes everything");
+        }
         let mut stack = vec![Pending { what: "camera", ray, path: Path::of_sample(0) }];
         let (mut count, mut color) = (0, Vec3::ZERO);
         while let Some(next) = stack.pop() {
