@@ -26,10 +26,10 @@ const LIGHTS: usize = 64;
 /// In words, for the report.
 pub const DEFINITION: &str = "A pixel is smooth if all of 256 rays through it and the lens meet the same primitive with \
     normals alike (cosine above 0.9), all see the same lights unoccluded (one point each of those that have a size), and \
-    the material neither mirrors nor refracts nor has an image. For this, pixel, lens and lights are taken as 1.2 times as \
+    the material neither mirrors nor refracts nor has an image. For this, pixel, lens and lights are taken as 1.5 times as \
     wide as they are: an edge that 256 rays may miss shows in 4096.";
 /// How much wider.
-const WIDER: f64 = 1.2;
+const WIDER: f64 = 1.5;
 
 /// Of each pixel, row by row: whether it is smooth.
 ///

@@ -13,8 +13,8 @@ use serde_json::{Value, json};
 
 /// What is measured, and how.
 pub const ABOUT: &str = "Small pictures with more and more samples, against a reference with many. Errors are of linear \
-    light; seconds are those of the render loop on all threads, medians over the seeds like every other figure. Pixels \
-    are averaged over their square (a box filter). The last part is about single rays: what is wrong with the numbers, over \
+    light; seconds are those of the render loop on all threads, medians over the seeds like every other figure. The \
+    last part is about single rays: what is wrong with the numbers, over \
     the time that a ray takes.";
 
 /// RMSE that everybody is to reach.
@@ -51,7 +51,7 @@ pub fn sections(subject: &Subject, reference: &Reference, measured: &Measured, o
     let repeat = repeat(subject, reference, options);
     vec![
         Section { repeat: repeat.clone(), ..figures(subject, reference, measured) },
-        Section { repeat: repeat.clone(), ..slopes(subject, reference, measured) },
+        Section { repeat: repeat.clone(), ..slopes(subject, measured) },
         Section { repeat, ..reached(subject, measured) },
     ]
 }
@@ -135,19 +135,25 @@ fn row(name: &str, p: &Point) -> Vec<String> {
 fn about(subject: &Subject, reference: &Reference) -> String {
     let job = &subject.job;
     let (width, height) = job.size;
+    let smooth = match reference.smooth_share() {
+        0.0 => "Of smooth pixels there are too few to tell about.".to_owned(),
+        share => format!(
+            "Smooth: RMSE of the {:.1} % smooth pixels, where the reference's is {:.1e}.",
+            100.0 * share,
+            reference.noise_smooth
+        ),
+    };
     format!(
-        "{width}x{height} pixels, rays bounce {} times at most. The reference: {BLOCKS} blocks of {} samples a pixel with seeds of their own, by \
-         the native backend in f64, the whole tree of rays, no adaptivity, added up in f64. Its own RMSE, from the spread \
-         between the blocks, is {:.2e}. The RMSE of the table are without it (the root of the difference of the squares); \
-         where less than that noise is left it is in brackets, and plots and slopes end before it. The other figures are \
-         as measured. Smooth: RMSE of the {:.1} % smooth pixels, where the reference's is {:.1e}. {} relMSE is trimmed of \
-         the worst 0.1 %; FLIP and SSIM are of sRGB. One sample goes through the pixel's middle. Hierarchies were built \
-         before: {}.",
+        "{width}x{height} pixels, filter {}, rays bounce {} times at most. The reference: {BLOCKS} blocks of {} samples a \
+         pixel with seeds of their own, by the native backend in f64, the whole tree of rays, no adaptivity, added up in \
+         f64. Its own RMSE, from the spread between the blocks, is {:.2e}. The RMSE of the table are without it (the root \
+         of the difference of the squares); where less than that noise is left it is in brackets, and plots and slopes end \
+         before it. The other figures are as measured. {smooth} {} relMSE is trimmed of the worst 0.1 %; FLIP and SSIM are \
+         of sRGB. One sample without a lens goes through the pixel's middle. Hierarchies were built before: {}.",
+        job.filter.name(),
         job.k_max,
         reference.spp,
         reference.noise,
-        100.0 * reference.smooth_share(),
-        reference.noise_smooth,
         smooth::DEFINITION,
         subject.build_seconds()
     )
@@ -176,7 +182,7 @@ fn line(curve: &Curve, points: Vec<(f64, f64)>) -> Line {
     Line { name: format!("{}{slope}", curve.candidate.name), points }
 }
 
-fn slopes(subject: &Subject, reference: &Reference, measured: &Measured) -> Section {
+fn slopes(subject: &Subject, measured: &Measured) -> Section {
     let mut table =
         Table::new(&["candidate", "by samples", "from 16 samples", "by seconds", "smooth, by samples", "points"]);
     let mut data = Vec::new();
@@ -203,9 +209,8 @@ fn slopes(subject: &Subject, reference: &Reference, measured: &Measured) -> Sect
         title: format!("{}: how fast the error falls", subject.name),
         about: format!(
             "Slopes of log RMSE, fitted by least squares over the last {LAST} points that are more than the reference's \
-             noise ({:.1e}; {:.1e} of the smooth pixels). Independent random numbers give -0.5, at edges and on smooth \
-             pixels alike; good points about -0.66 or better at edges, and -1 to -1.5 on smooth pixels.",
-            reference.noise, reference.noise_smooth
+             noise. Independent random numbers give -0.5, at edges and on smooth \
+             pixels alike; good points about -0.66 or better at edges, and -1 to -1.5 on smooth pixels."
         ),
         repeat: String::new(),
         table,
