@@ -66,7 +66,7 @@ impl<B: Backend> Teller<'_, B> {
     fn tell(&self, camera: &CameraDesc, x: u32, y: u32) -> Result<String, String> {
         let camera = camera.prepare(&self.scene.frame, self.job.size)?;
         let mut batch = PacketBatch::default();
-        let sampling = self.job.sampling();
+        let sampling = self.job.sampling(&camera);
         let segment = Segment { pixels: &[(x, y)], first: 0, samples: 1, sampling: &sampling };
         segment.camera_rays(&camera, self.job, &mut batch);
         let ray = batch.packets()[0].ray.get(0);

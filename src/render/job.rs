@@ -3,6 +3,7 @@
 use super::adapt;
 use crate::film::{Aov, Film};
 use crate::math::{Filter, Sampler, Sampling};
+use crate::scene::Camera;
 use crate::scene::desc::LensSampler;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
@@ -101,8 +102,9 @@ impl Job {
 
     /// Where its samples lie.
     #[must_use]
-    pub fn sampling(&self) -> Sampling {
-        Sampling::new(self.sampler, self.seed, self.spp, self.light_samples.max(1))
+    pub fn sampling(&self, camera: &Camera) -> Sampling {
+        let sampling = Sampling::new(self.sampler, self.seed, self.spp, self.light_samples.max(1));
+        if camera.lens.is_some() { sampling } else { sampling.without_lens() }
     }
 
     /// Whether pixels may get different numbers of samples.

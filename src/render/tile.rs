@@ -159,6 +159,7 @@ fn on_lens(sampler: LensSampler, samples: PixelSamples<'_>, sample: u32, [u, v]:
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Sampler;
     use std::collections::HashSet;
 
     const CROP: Crop = Crop { x0: 5, y0: 3, x1: 80, y1: 50 };
@@ -196,7 +197,7 @@ mod tests {
     #[test]
     fn segments_hold_every_sample_once_and_in_order() {
         let all = pixels_of(tiles(CROP)[0]);
-        let sampling = Job::whole((100, 100)).sampling();
+        let sampling = Sampling::new(Sampler::Sobol, 0, 70, 1);
         for spp in [1, 2, 5, 16, 17, 70] {
             let mut next = vec![0; all.len()];
             let mut at = std::collections::HashMap::new();

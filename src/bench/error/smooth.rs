@@ -41,7 +41,7 @@ pub fn pixels(subject: &Subject) -> Result<Vec<bool>, String> {
     let camera = wide.prepare(&subject.scene.frame, subject.job.size)?;
     let jitter_radius = WIDER * subject.job.jitter_radius;
     let job = Job { spp: SAMPLES, seed: SEED, jitter_radius, ..subject.job.clone() };
-    let sampling = job.sampling();
+    let sampling = job.sampling(&camera);
     let backend = subject.backend(BackendKind::Native);
     let row = |y: u32| {
         let mut look = Look {
