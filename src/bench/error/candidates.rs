@@ -56,7 +56,7 @@ pub fn all(options: &Options) -> Vec<Candidate> {
         of_lens("random, rejection", |job| {
             (job.sampler, job.lens_sampler) = (Sampler::Random, LensSampler::Rejection);
         }),
-        of_lens("random, uniform radius", |job| {
+        of_lens("uniform radius (biased)", |job| {
             (job.sampler, job.lens_sampler) = (Sampler::Random, LensSampler::PolarUniformRadius);
         }),
     ];
