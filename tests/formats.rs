@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 use std::fs;
 use std::path::{Path, PathBuf};
-use tison::math::Sampler;
+use tison::math::{Filter, Sampler};
 use tison::scene::desc::{Falloff, ReflectDesc, SceneDesc, ShapeDesc, TransformStep, Weight};
 use tison::scene::format::{Diagnostic, Look, Override, ReadOptions, Severity, parse, to_toml};
 
@@ -79,7 +79,7 @@ fn every_key_is_read() {
     let d = good("everything.toml", EVERYTHING);
     let (main, flat, shot) = (&d.cameras[0], &d.cameras[1], &d.cameras[2]);
     assert_eq!((main.name.as_str(), flat.name.as_str(), shot.name.as_str()), ("main", "flat", "a \"shot\""));
-    assert_eq!(d.render.sampler, Some(Sampler::Stratified));
+    assert_eq!((d.render.filter, d.render.sampler), (Some(Filter::Box), Some(Sampler::Stratified)));
     assert_eq!(main.camera.focus, Some(8.0));
     assert!((shot.camera.focus.expect("on a point") - 65.0_f64.sqrt()).abs() < 1e-14);
     assert_eq!(d.lights[0].color, [60.0, 30.0, 0.0]);
@@ -97,8 +97,8 @@ fn every_key_is_read() {
     let [TransformStep::Fit(2.0), TransformStep::Matrix(m)] = d.objects[4].transform[..] else { panic!("two steps") };
     assert_eq!(m.transform_point3([0.0; 3].into()).to_array(), [-2.0, 3.0, 4.0]);
     let ShapeDesc::Mesh { path, smooth: Some(180.0), place } = &d.objects[4].shape else { panic!("a smooth mesh") };
-    assert_eq!((path.as_path(), place.line, place.column), (Path::new("models/dragon.obj"), 98, 8));
-    assert_eq!((d.objects[0].place.line, d.objects[0].place.column), (74, 1));
+    assert_eq!((path.as_path(), place.line, place.column), (Path::new("models/dragon.obj"), 99, 8));
+    assert_eq!((d.objects[0].place.line, d.objects[0].place.column), (75, 1));
 }
 
 #[test]

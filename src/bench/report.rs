@@ -267,12 +267,12 @@ body { font: 15px/1.5 sans-serif; margin: 2em auto; max-width: 1240px; padding: 
 table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums; }
 th, td { padding: 2px 10px; text-align: right; border-bottom: 1px solid #8884; white-space: nowrap; }
 th:first-child, td:first-child { text-align: left; }
-.plots { display: flex; flex-wrap: wrap; gap: 8px; }
-.plots svg { max-width: 100%; height: auto; }
+.plots { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 540px), 1fr)); gap: 8px; }
+.plots svg { width: 100%; height: auto; }
 .pictures { display: flex; flex-wrap: wrap; gap: 12px; margin: 1em 0; }
 .pictures img { image-rendering: pixelated; margin-right: 4px; }
-figure { margin: 0; }
-figcaption { font-size: 13px; }
+figure { margin: 0; width: min-content; white-space: nowrap; }
+figcaption { font-size: 13px; white-space: normal; }
 .table { overflow-x: auto; }
 @media (prefers-color-scheme: dark) { body { color: #ddd; background: #181818; } }
 </style>

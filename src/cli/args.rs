@@ -11,7 +11,7 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use std::time::Duration;
 use tison::film::{Aov, Tonemap};
-use tison::math::Sampler;
+use tison::math::{Filter, Sampler};
 use tison::scene::desc::LensSampler;
 use tison::scene::obj::Reader;
 
@@ -297,6 +297,10 @@ pub struct PictureArgs {
         allow_negative_numbers = true, help_heading = "Quality"
     )]
     pub light_samples: Option<u32>,
+    /// Where the samples of a pixel lie and what they count; mitchell has negative lobes, which sharpen and add noise
+    /// [default: blackman-harris; box for .ray and for scenes that set jitter_radius]
+    #[arg(long, value_name = "NAME", value_parser = filter(), help_heading = "Quality")]
+    pub filter: Option<Filter>,
     /// How samples are drawn: sobol spreads pixel, lens and lights together; random takes each by chance; stratified
     /// takes one from each of as many cells [default: sobol]
     #[arg(long, value_name = "NAME", value_parser = sampler(), help_heading = "Quality")]
@@ -407,6 +411,11 @@ fn tonemap() -> impl TypedValueParser<Value = Tonemap> {
 fn obj_reader() -> impl TypedValueParser<Value = Reader> {
     PossibleValuesParser::new(Reader::ALL.map(Reader::name))
         .map(|name| Reader::ALL.into_iter().find(|r| r.name() == name).expect("only their names are possible"))
+}
+
+fn filter() -> impl TypedValueParser<Value = Filter> {
+    PossibleValuesParser::new(Filter::ALL.map(Filter::name))
+        .map(|name| Filter::ALL.into_iter().find(|f| f.name() == name).expect("only their names are possible"))
 }
 
 fn sampler() -> impl TypedValueParser<Value = Sampler> {

@@ -16,7 +16,7 @@ use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;
 use tison::geom::Bounds;
-use tison::math::{Frame, Sampler};
+use tison::math::{Filter, Frame, Sampler};
 use tison::render::Control;
 use tison::scene::desc::{LensSampler, NamedCamera, RenderDesc};
 use tison::scene::{CameraOverrides, Light, Loaded, Material, Projection, Reflect, Scene, View};
@@ -127,6 +127,7 @@ fn render_json(r: &RenderDesc) -> Value {
         "background": r.background,
         "ambient": r.ambient,
         "jitter_radius": r.jitter_radius,
+        "filter": r.filter.map(Filter::name),
         "sampler": r.sampler.map(Sampler::name),
         "lens_sampler": r.lens_sampler.map(LensSampler::name),
         "course_rules": r.course_rules,

@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use tison::backend::{self, AnyBackend, BackendKind, BuildOptions};
 use tison::film::{self, Display, Film, Notes, Tonemap};
-use tison::math::Sampler;
+use tison::math::{Filter, Sampler};
 use tison::metrics::Difference;
 use tison::render::{self, Adapted, Control, Job, Outcome, RenderStats, Stop};
 use tison::scene::format::Override;
@@ -403,11 +403,16 @@ fn notes(plan: &Plan, settings: &Settings, backend: &AnyBackend) -> Notes {
         Sampler::Sobol => String::new(),
         other => format!(", sampler {}", other.name()),
     };
+    let filter = match job.filter {
+        Filter::BlackmanHarris => String::new(),
+        _ if job.spp == 1 => String::new(),
+        other => format!(", filter {}", other.name()),
+    };
     Notes {
         software: format!("tison {}", *VERSION),
         title: name.to_string_lossy().into_owned(),
         comment: format!(
-            "{}x{}, spp {}{stop}, seed {}, backend {backend}{sampler}{curve}{exposure}",
+            "{}x{}, spp {}{stop}, seed {}, backend {backend}{sampler}{filter}{curve}{exposure}",
             job.size.0, job.size.1, job.spp, job.seed
         ),
         error: String::new(),

@@ -6,7 +6,7 @@ use super::frame::Frame;
 use super::plan::{Input, Plan};
 use std::fmt;
 use tison::film::{Display, Tonemap};
-use tison::math::Sampler;
+use tison::math::{Filter, Sampler};
 use tison::render::{Job, Stop};
 use tison::scene::desc::{LensSampler, RenderDesc};
 
@@ -92,6 +92,7 @@ impl Settings {
         let course = render.course_rules;
         let light_samples = render.samples.filter(|_| course);
         let light_samples = all.choose("light-samples", "render.samples", flags.light_samples, light_samples, 1);
+        let filter = all.filter(flags, render, spp)?;
         let sampler = (flags.sampler, render.sampler);
         let sampler = all.by_name("sampler", "render.sampler", sampler, Sampler::default(), Sampler::name);
         let lens_sampler = (flags.lens_sampler, render.lens_sampler);
@@ -112,6 +113,7 @@ impl Settings {
             k_max,
             min_weight,
             centre: flags.centre,
+            filter,
             sampler,
             lens_sampler,
             jitter_radius,
@@ -210,6 +212,30 @@ impl Choices<'_> {
     ) -> T {
         self.choose(name, key, said.0.map(text), said.1.map(text), text(default));
         said.0.or(said.1).unwrap_or(default)
+    }
+
+    /// Course scenes, and those that say how wide the box is, keep the box. A lone sample is not spread.
+    fn filter(&mut self, flags: &PictureArgs, render: &RenderDesc, spp: u32) -> Result<Filter, Failure> {
+        if let Some(filter) = flags.filter.filter(|&f| f != Filter::Box) {
+            let name = filter.name();
+            if render.jitter_radius.is_some() {
+                let what = format!("--filter {name} has a width of its own, but the scene sets jitter_radius");
+                return Err(
+                    Failure::usage(what).help("leave one of the two out; jitter_radius is the width of the box")
+                );
+            }
+            if spp == 1 {
+                let what = format!("--filter {name} changes nothing with one sample a pixel");
+                return Err(Failure::usage(what).help("leave it out, or add --spp 16"));
+            }
+        }
+        let (key, scene) = match render {
+            RenderDesc { jitter_radius: Some(_), .. } => ("render.jitter_radius", Some(Filter::Box)),
+            RenderDesc { filter: None, course_rules: true, .. } => ("render.course_rules", Some(Filter::Box)),
+            _ => ("render.filter", render.filter),
+        };
+        let default = if spp == 1 { Filter::Box } else { Filter::BlackmanHarris };
+        Ok(self.by_name("filter", key, (flags.filter, scene), default, Filter::name))
     }
 
     /// Course scenes are shown as the course's program shows them.

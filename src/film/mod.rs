@@ -24,7 +24,7 @@ pub struct Film {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// Linear RGB, mean of the samples of each pixel; finite.
+    /// Linear RGB, mean of the samples of each pixel; finite. A filter with negative lobes makes some a little negative.
     pub color: Vec<[f32; 3]>,
     /// Auxiliary images, in the order asked for.
     pub aovs: Vec<AovImage>,

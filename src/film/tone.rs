@@ -140,6 +140,11 @@ mod tests {
             (Tonemap::None, 0.0, [0.25, 0.5, 7.0], [0.25, 0.5, 1.0]),
             (Tonemap::None, 1.0, [0.25, 0.5, 7.0], [0.5, 1.0, 1.0]),
             (Tonemap::None, -2.0, [0.25, 0.5, 3.0], [0.0625, 0.125, 0.75]),
+            // What a filter with negative lobes leaves beside a bright edge is black.
+            (Tonemap::None, 0.0, [-0.04, 1.04, -1e-9], [0.0, 1.0, 0.0]),
+            (Tonemap::None, 1.0, [-0.04, 1.04, -1e-9], [0.0, 1.0, 0.0]),
+            (Tonemap::Reinhard, 0.0, [-0.04, -0.04, -0.04], [0.0; 3]),
+            (Tonemap::Aces, 0.0, [-0.04, -0.04, -0.04], [0.0; 3]),
             (Tonemap::Reinhard, 0.0, [1.0, 1.0, 1.0], [0.5, 0.5, 0.5]),
             (Tonemap::Reinhard, 1.0, [1.5, 1.5, 1.5], [0.75, 0.75, 0.75]),
             // Luminance 0.2126 * 2: all channels are divided alike.

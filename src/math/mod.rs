@@ -2,11 +2,13 @@
 
 pub mod colour;
 pub mod dd;
+mod filter;
 mod frame;
 mod pow;
 mod random;
 mod sampling;
 
+pub use filter::Filter;
 pub use frame::Frame;
 pub use pow::pow01;
 pub use random::Random;

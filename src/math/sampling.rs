@@ -52,6 +52,8 @@ pub struct Sampling {
     in_pixel: Strata,
     /// Cells of a light.
     at_light: Strata,
+    /// The pair of dimensions that looks at the first light.
+    first_light: u32,
 }
 
 impl Sampling {
@@ -59,7 +61,14 @@ impl Sampling {
     #[must_use]
     pub fn new(sampler: Sampler, seed: u32, spp: u32, light_samples: u32) -> Self {
         let (in_pixel, at_light) = (Strata::new(spp), Strata::new(spp.saturating_mul(light_samples)));
-        Self { sampler, seed: hash(seed), in_pixel, at_light }
+        Self { sampler, seed: hash(seed), in_pixel, at_light, first_light: 2 }
+    }
+
+    /// The same where no point of the lens is asked for: the dimensions of the lens look at the first light, which is
+    /// then spread together with the pixel as well as can be.
+    #[must_use]
+    pub fn without_lens(self) -> Self {
+        Self { first_light: 1, ..self }
     }
 
     /// The same kind of points, scrambled or drawn independently.
@@ -76,7 +85,7 @@ impl Sampling {
     }
 }
 
-/// The sample points of one pixel: dimensions 0, 1 for the pixel, 2, 3 for the lens, then two
+/// The sample points of one pixel: dimensions 0, 1 for the pixel, 2, 3 for the lens if there is one, then two
 /// for each light that has a size.
 ///
 /// They are a function of (pixel, sample, seed) and the kind of [`Sampling`] alone, so that any thread may draw any
@@ -111,7 +120,8 @@ impl PixelSamples<'_> {
         let own_seed = || hash(self.seed ^ hash(branch.0 ^ hash(light + 1)));
         match self.sampling.sampler {
             Sampler::Sobol => {
-                let (set, half) = (1 + light / 2, 2 * (light % 2) as usize);
+                let pair = self.sampling.first_light + light;
+                let (set, half) = (pair / 2, 2 * (pair % 2) as usize);
                 if branch == Branch::CAMERA && set < sobol_burley::NUM_DIMENSION_SETS_4D {
                     let point = sobol(set, index, self.seed);
                     [point[half], point[half + 1]]

@@ -9,6 +9,10 @@ pub const FIRST: u32 = 16;
 /// What twice as many samples leave of a squared error: that of an edge under evenly spread samples.
 const LEFT: f64 = 0.4;
 
+/// How many times fewer samples the neighbours of a pixel may have that goes on for the sake of the whole image: what they
+/// missed is in the estimate of its error.
+const BEHIND: u32 = 4;
+
 /// Pixels worked on by one thread at a time: a fixed number, so that sums are the same for any number of threads.
 const PART: usize = 1 << 14;
 
@@ -48,14 +52,14 @@ pub fn choose(pixels: &[Progress], width: usize, most: u32, goal: Goal, factor: 
     if pixels.iter().any(|p| p.taken < FIRST.min(most)) {
         return Choice { go_on: vec![true; pixels.len()], expected: pixels.len() as u64 * u64::from(FIRST) };
     }
-    let wanted: Vec<u64> = match goal {
+    let (wanted, behind): (Vec<u64>, u32) = match goal {
         Goal::Noise(threshold) => {
             let more = |p: &Progress| if p.is_noisy(threshold) { u64::from(p.taken.min(most - p.taken)) } else { 0 };
-            pixels.iter().map(more).collect()
+            (pixels.iter().map(more).collect(), 1)
         }
-        Goal::Rmse(target) => Allocation { pixels, most, factor }.towards(target),
+        Goal::Rmse(target) => (Allocation { pixels, most, factor }.towards(target), BEHIND),
     };
-    Choice { expected: wanted.iter().sum(), go_on: dilated(pixels, &wanted, width, most) }
+    Choice { expected: wanted.iter().sum(), go_on: dilated(pixels, &wanted, width, most, behind) }
 }
 
 impl Progress {
@@ -123,8 +127,9 @@ impl Allocation<'_> {
     }
 }
 
-/// The wanted pixels, and neighbours that have no more samples than those: they may have missed what those saw.
-fn dilated(pixels: &[Progress], wanted: &[u64], width: usize, most: u32) -> Vec<bool> {
+/// The wanted pixels, and neighbours that have no more than their share `1 / behind` of the samples: they may have missed
+/// what those saw.
+fn dilated(pixels: &[Progress], wanted: &[u64], width: usize, most: u32, behind: u32) -> Vec<bool> {
     let height = pixels.len() / width;
     let goes = |x: usize, y: usize| {
         let own = &pixels[y * width + x];
@@ -133,7 +138,7 @@ fn dilated(pixels: &[Progress], wanted: &[u64], width: usize, most: u32) -> Vec<
             && around(y, height).any(|v| {
                 around(x, width).any(|u| {
                     let i = v * width + u;
-                    wanted[i] > 0 && ((u, v) == (x, y) || own.taken <= pixels[i].taken)
+                    wanted[i] > 0 && ((u, v) == (x, y) || own.taken.saturating_mul(behind) <= pixels[i].taken)
                 })
             })
     };
@@ -210,6 +215,19 @@ mod tests {
         assert!(spent < all / 5, "{spent} of {all}");
         assert!(spent > all / 30, "the edges alone need a twentieth");
         assert_eq!(pixels[0].taken, 64, "far from the edges nothing is to be gained");
+    }
+
+    #[test]
+    fn neighbours_are_not_left_too_far_behind() {
+        let mut pixels = flat();
+        pixels[4 * WIDTH + 7].error = 0.1;
+        to_target(&mut pixels, 1e-4);
+        let (own, next, far) = (pixels[4 * WIDTH + 7], pixels[4 * WIDTH + 8], pixels[4 * WIDTH + 9]);
+        assert!(
+            own.taken >= 1024 && next.taken >= own.taken / (2 * BEHIND) && next.taken < own.taken,
+            "{own:?} {next:?}"
+        );
+        assert_eq!(far.taken, 64);
     }
 
     #[test]

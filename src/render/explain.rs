@@ -66,7 +66,7 @@ impl<B: Backend> Teller<'_, B> {
     fn tell(&self, camera: &CameraDesc, x: u32, y: u32) -> Result<String, String> {
         let camera = camera.prepare(&self.scene.frame, self.job.size)?;
         let mut batch = PacketBatch::default();
-        let sampling = self.job.sampling();
+        let sampling = self.job.sampling(&camera);
         let segment = Segment { pixels: &[(x, y)], first: 0, samples: 1, sampling: &sampling };
         segment.camera_rays(&camera, self.job, &mut batch);
         let ray = batch.packets()[0].ray.get(0);
@@ -79,6 +79,11 @@ impl<B: Backend> Teller<'_, B> {
             out: String::new(),
         };
         let mut out = format!("pixel {x},{y}\n");
+        if self.job.has_negative_samples() {
+            let weight = told.segment.weight(0, self.job);
+            writeln!(out, "filter {}: the sample counts {weight:.6}", self.job.filter.name())
+                .expect("a string takes everything");
+        }
         let mut stack = vec![Pending { what: "camera", ray, path: Path::of_sample(0) }];
         let (mut count, mut color) = (0, Vec3::ZERO);
         while let Some(next) = stack.pop() {

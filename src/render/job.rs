@@ -2,7 +2,8 @@
 
 use super::adapt;
 use crate::film::{Aov, Film};
-use crate::math::{Sampler, Sampling};
+use crate::math::{Filter, Sampler, Sampling};
+use crate::scene::Camera;
 use crate::scene::desc::LensSampler;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
@@ -44,7 +45,11 @@ pub struct Job {
     pub sampler: Sampler,
     /// How points of the lens are drawn.
     pub lens_sampler: LensSampler,
-    /// Camera rays pass within this many pixels of their pixel's centre, across and down; 0.5 is the whole pixel.
+    /// Where in and around a pixel its samples lie, and what they count. Auxiliary images take them all alike. One
+    /// sample a pixel is not filtered.
+    pub filter: Filter,
+    /// With [`Filter::Box`] camera rays pass within this many pixels of their pixel's centre, across and down; 0.5 is the
+    /// whole pixel.
     pub jitter_radius: f64,
     /// Shadow rays at each light that has a size, per hit; at least 1.
     pub light_samples: u32,
@@ -69,10 +74,27 @@ impl Job {
             centre: false,
             sampler: Sampler::default(),
             lens_sampler: LensSampler::default(),
+            filter: Filter::default(),
             jitter_radius: 0.5,
             light_samples: 1,
             aovs: Vec::new(),
         }
+    }
+
+    /// Where `u` in `[0, 1)` is from a pixel's centre, across or down, in pixels.
+    #[inline]
+    #[must_use]
+    pub fn offset(&self, u: f64) -> f64 {
+        match self.filter {
+            Filter::Box => 2.0 * self.jitter_radius * (u - 0.5),
+            filter => filter.offset(u),
+        }
+    }
+
+    /// Whether some samples count negative.
+    #[must_use]
+    pub fn has_negative_samples(&self) -> bool {
+        self.spp > 1 && self.filter.has_negative_lobes()
     }
 
     /// Samples that every pixel gets before any is found to have enough; a time limit may leave it fewer.
@@ -80,8 +102,9 @@ impl Job {
 
     /// Where its samples lie.
     #[must_use]
-    pub fn sampling(&self) -> Sampling {
-        Sampling::new(self.sampler, self.seed, self.spp, self.light_samples.max(1))
+    pub fn sampling(&self, camera: &Camera) -> Sampling {
+        let sampling = Sampling::new(self.sampler, self.seed, self.spp, self.light_samples.max(1));
+        if camera.lens.is_some() { sampling } else { sampling.without_lens() }
     }
 
     /// Whether pixels may get different numbers of samples.

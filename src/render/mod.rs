@@ -90,7 +90,7 @@ pub fn run_with<B: Backend>(
         return Err("stratified samples are spread as a whole: how many there are must be known before".into());
     }
     let needs = scene.needs();
-    let sampling = job.sampling();
+    let sampling = job.sampling(&camera);
     let twice = (job.is_adaptive() || (job.estimate && job.spp > 1)).then(|| Twice::of(job.crop, job.seed));
     let outcome = if needs.secondary_rays() {
         Render::<B, true> { scene, camera, backend, job, control, needs, sampling, twice }.run()

@@ -8,8 +8,12 @@ use glam::{DVec3, Vec3};
 /// The sums of one pixel's samples.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PixelSum {
-    /// Linear RGB of the samples that count.
+    /// Linear RGB of the samples that count, times their weights.
     pub color: DVec3,
+    /// Where weights differ from 1: the same without weights, and what the weights lack of 1 in all.
+    pub plain: DVec3,
+    /// See `plain`.
+    pub lack: f64,
     /// Squared deviations from the mean, over the channels and the samples that count; kept only if somebody asked.
     pub deviation: f64,
     /// As in [`Bound`](super::certificate::Bound).
@@ -22,9 +26,14 @@ pub struct PixelSum {
 
 impl PixelSum {
     /// Linear RGB, the mean; black if nothing counts.
+    ///
+    /// Weights are moved to a mean of 1: a flat area stays flat, where the weights alone would make it noisy. What that adds
+    /// to the expected value falls with the number of samples. It is the control variate `weight - 1`, with the plain
+    /// mean as its coefficient.
     #[must_use]
     pub fn mean(&self) -> DVec3 {
-        self.color / f64::from(self.counted.max(1))
+        let n = f64::from(self.counted.max(1));
+        if self.lack == 0.0 { self.color / n } else { (self.color + self.plain * (self.lack / n)) / n }
     }
 
     /// Mean over the channels of the squared standard error of the mean, were the samples independent.
@@ -41,31 +50,53 @@ impl PixelSum {
     pub fn add(&mut self, samples: &[DVec3], deviations: bool) {
         self.taken += samples.len() as u32;
         let before = *self;
-        for color in samples.iter().map(|c| c.as_vec3()) {
-            if color.is_finite() {
-                self.color += color.as_dvec3();
-                self.counted += 1;
-            }
+        for color in samples.iter().filter_map(|s| kept(*s)) {
+            self.color += color;
+            self.counted += 1;
         }
         if deviations {
-            self.deviate(&before, samples);
+            self.deviate(&before, samples.iter().filter_map(|s| kept(*s)));
+        }
+    }
+
+    /// Adds samples that count as much as their weights say.
+    pub fn add_weighed(&mut self, samples: impl Iterator<Item = (DVec3, f64)> + Clone, deviations: bool) {
+        self.taken += samples.clone().count() as u32;
+        let before = *self;
+        let samples = samples.filter_map(|(sample, weight)| Some((kept(sample)?, weight)));
+        for (color, weight) in samples.clone() {
+            self.color += weight * color;
+            self.plain += color;
+            self.lack += 1.0 - weight;
+            self.counted += 1;
+        }
+        if deviations {
+            // Of what the control variate leaves.
+            let middle = (self.plain - before.plain) / f64::from((self.counted - before.counted).max(1));
+            self.deviate(&before, samples.map(|(color, weight)| color + (weight - 1.0) * (color - middle)));
         }
     }
 
     /// Source: T. F. Chan, G. H. Golub, R. J. LeVeque, "Updating Formulae and a Pairwise Algorithm for Computing Sample
     /// Variances", 1979, eq. 2.1.
-    fn deviate(&mut self, before: &Self, samples: &[DVec3]) {
+    fn deviate(&mut self, before: &Self, samples: impl Iterator<Item = DVec3> + Clone) {
         let (n, m) = (f64::from(before.counted), f64::from(self.counted - before.counted));
         if m == 0.0 {
             return;
         }
-        let mean = (self.color - before.color) / m;
-        let finite = samples.iter().map(|c| c.as_vec3()).filter(|c| c.is_finite());
-        self.deviation += finite.map(|c| (c.as_dvec3() - mean).length_squared()).sum::<f64>();
+        let mean = samples.clone().sum::<DVec3>() / m;
+        self.deviation += samples.map(|c| (c - mean).length_squared()).sum::<f64>();
         if n > 0.0 {
-            self.deviation += (mean - before.color / n).length_squared() * n * m / (n + m);
+            self.deviation += (mean - before.mean()).length_squared() * n * m / (n + m);
         }
     }
+}
+
+/// The sample as films hold it, if it can be held.
+#[inline]
+fn kept(sample: DVec3) -> Option<DVec3> {
+    let sample = sample.as_vec3();
+    sample.is_finite().then(|| sample.as_dvec3())
 }
 
 /// What the auxiliary images show of a pixel, while its samples come in.
@@ -147,6 +178,35 @@ mod tests {
                 assert_eq!((sum.taken, sum.counted), (100, 100));
             }
         }
+    }
+
+    #[test]
+    fn weights_leave_flat_areas_flat_and_slopes_what_they_are() {
+        let weights = [1.145, -1.145, 1.145, 1.145, 0.8];
+        let weighed = |samples: &[DVec3]| {
+            let mut sum = PixelSum::default();
+            for part in samples.chunks(16) {
+                sum.add_weighed(part.iter().copied().zip(weights.iter().copied().cycle()), true);
+            }
+            sum
+        };
+        let flat = weighed(&[DVec3::splat(0.7); 40]);
+        assert!((flat.mean() - 0.7f32 as f64).abs().max_element() < 1e-12 && flat.error() < 1e-20, "{flat:?}");
+        assert_eq!((flat.taken, flat.counted), (40, 40));
+        let samples = samples(80, 1.0);
+        let (mut sum, mut total) = (DVec3::ZERO, 0.0);
+        for part in samples.chunks(16) {
+            for (sample, weight) in part.iter().zip(weights.iter().cycle()) {
+                sum += *weight * sample.as_vec3().as_dvec3();
+                total += 1.0 - weight;
+            }
+        }
+        let plain = samples.iter().map(|s| s.as_vec3().as_dvec3()).sum::<DVec3>() / 80.0;
+        let want = (sum + plain * total) / 80.0;
+        assert!((weighed(&samples).mean() - want).length() < 1e-12);
+        // Samples around 1 that deviate by a third, times weights of a root mean square of 1.08.
+        let ratio = weighed(&samples).error() / squared_error(&samples);
+        assert!((1.0..1.35).contains(&ratio), "{ratio}");
     }
 
     #[test]

@@ -100,6 +100,14 @@ impl<'a> Segment<'a> {
         (self.sampling.pixel(x, y), self.first + slot % self.samples)
     }
 
+    /// What the sample of ray `slot` counts in its pixel: [`Filter::weight`](crate::math::Filter::weight).
+    #[must_use]
+    pub fn weight(&self, slot: u32, job: &Job) -> f64 {
+        let (samples, sample) = self.samples_of(slot);
+        let [a, b, ..] = samples.point(sample);
+        job.filter.weight(job.offset(a), job.offset(b))
+    }
+
     /// Fills `batch` with the camera rays.
     pub fn camera_rays(&self, camera: &Camera, job: &Job, batch: &mut PacketBatch<RayHitPacket>) {
         batch.resize(self.pixels.len() * self.samples as usize);
@@ -127,8 +135,7 @@ fn image_point(camera: &Camera, job: &Job, sampling: &Sampling, pixel: (u32, u32
     }
     let samples = sampling.pixel(pixel.0, pixel.1);
     let [a, b, u, v] = samples.point(sample);
-    let spread = |a: f64| 0.5 + 2.0 * job.jitter_radius * (a - 0.5);
-    let (dx, dy) = if job.spp == 1 { lone } else { (spread(a), spread(b)) };
+    let (dx, dy) = if job.spp == 1 { lone } else { (0.5 + job.offset(a), 0.5 + job.offset(b)) };
     let disc = if camera.lens.is_some() { on_lens(job.lens_sampler, samples, sample, [u, v]) } else { DVec2::ZERO };
     (x + dx, y + dy, disc)
 }
@@ -152,6 +159,7 @@ fn on_lens(sampler: LensSampler, samples: PixelSamples<'_>, sample: u32, [u, v]:
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Sampler;
     use std::collections::HashSet;
 
     const CROP: Crop = Crop { x0: 5, y0: 3, x1: 80, y1: 50 };
@@ -189,7 +197,7 @@ mod tests {
     #[test]
     fn segments_hold_every_sample_once_and_in_order() {
         let all = pixels_of(tiles(CROP)[0]);
-        let sampling = Job::whole((100, 100)).sampling();
+        let sampling = Sampling::new(Sampler::Sobol, 0, 70, 1);
         for spp in [1, 2, 5, 16, 17, 70] {
             let mut next = vec![0; all.len()];
             let mut at = std::collections::HashMap::new();

@@ -119,8 +119,12 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
     fn add_up(&self, sums: &mut [PixelSum], segment: &Segment<'_>) {
         let samples = segment.samples as usize;
         let gathered = &self.waves.gathered;
+        let deviations = self.render.twice.is_some();
+        if self.render.job.has_negative_samples() {
+            return self.add_up_weighed(sums, segment, deviations);
+        }
         for (sum, colors) in sums.iter_mut().zip(gathered.color.chunks_exact(samples)) {
-            sum.add(colors, self.render.twice.is_some());
+            sum.add(colors, deviations);
         }
         if SECONDARY {
             for (sum, cuts) in sums.iter_mut().zip(gathered.cut.chunks_exact(samples)) {
@@ -128,6 +132,20 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
                     sum.cut[0] += cut[0];
                     sum.cut[1] += cut[1];
                 }
+            }
+        }
+    }
+
+    /// The same where the pixel filter weighs them. What was left out counts as much, whatever the sign.
+    fn add_up_weighed(&self, sums: &mut [PixelSum], segment: &Segment<'_>, deviations: bool) {
+        let (samples, job, gathered) = (segment.samples as usize, self.render.job, &self.waves.gathered);
+        for (i, (sum, colors)) in sums.iter_mut().zip(gathered.color.chunks_exact(samples)).enumerate() {
+            let weights: Vec<f64> = (0..samples).map(|k| segment.weight((i * samples + k) as u32, job)).collect();
+            sum.add_weighed(colors.iter().copied().zip(weights.iter().copied()), deviations);
+            let cuts = gathered.cut.get(i * samples..(i + 1) * samples).unwrap_or_default();
+            for (cut, weight) in cuts.iter().zip(&weights) {
+                sum.cut[0] += cut[0] * weight.abs();
+                sum.cut[1] += cut[1] * weight.abs();
             }
         }
     }

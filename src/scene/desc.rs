@@ -2,7 +2,7 @@
 //! that it names. Every scene format ends here; `freeze` goes on.
 
 use super::CameraDesc;
-use crate::math::Sampler;
+use crate::math::{Filter, Sampler};
 use glam::{DMat4, DVec3};
 use std::path::PathBuf;
 
@@ -51,8 +51,10 @@ pub struct RenderDesc {
     /// Ambient light, linear RGB; none unless given.
     pub ambient: Option<[f64; 3]>,
     /// Each camera ray passes within this many pixels of its pixel's centre, in x and y; half a
-    /// pixel (the whole pixel) unless given.
+    /// pixel (the whole pixel) unless given. Makes the filter a box.
     pub jitter_radius: Option<f64>,
+    /// How samples of a pixel are spread and weighed; [`Filter::Box`] if `jitter_radius` is given too.
+    pub filter: Option<Filter>,
     /// How samples are drawn.
     pub sampler: Option<Sampler>,
     /// How lens points are drawn.

@@ -13,6 +13,7 @@ min_weight = 0.25
 seed = 7
 background = [0.1, 0.2, 0.3]
 ambient = [0.1, 0.1, 0.1]
+filter = "tent"
 sampler = "stratified"
 lens_sampler = "polar"
 [camera.main]
@@ -123,6 +124,7 @@ fn a_flag_wins_over_the_scene_and_the_scene_over_the_default() {
         ("recursion", "-r 50", ["8", "3", "50"]),
         ("min-weight", "--min-weight 0", ["0.0009765625", "0.25", "0"]),
         ("seed", "--seed 1", ["0", "7", "1"]),
+        ("filter", "--filter box", ["blackman-harris", "tent", "box"]),
         ("sampler", "--sampler random", ["sobol", "stratified", "random"]),
         ("lens-sampler", "--lens-sampler rejection", ["concentric", "polar", "rejection"]),
     ];
@@ -168,6 +170,25 @@ fn the_image_is_what_the_settings_say() {
     assert!(image(&bench, "s.toml --seed 7 --spp 2 -r 3") == image(&bench, "s.toml"));
     assert!(image(&bench, "s.toml --seed 8") != image(&bench, "s.toml"));
     assert!(image(&bench, "s.toml -r=0") != image(&bench, "s.toml -r=3"));
+}
+
+#[test]
+fn the_filter_shows_and_is_noted() {
+    let bench = bench();
+    let images = ["box", "tent", "blackman-harris", "mitchell"].map(|name| {
+        bench.expect(&format!("s.toml -q --spp 16 --filter {name} -o {name}.png -o {name}.pfm"), 0);
+        let noted = format!("filter {name}");
+        let has = |bytes: &[u8]| bytes.windows(noted.len()).any(|w| w == noted.as_bytes());
+        assert_eq!(has(&bench.read(&format!("{name}.png"))), name != "blackman-harris", "{name}");
+        light(&bench.read(&format!("{name}.pfm")), 40, 3)
+    });
+    for (i, image) in images.iter().enumerate() {
+        assert!(images[..i].iter().all(|other| other != image));
+    }
+    bench.write("silent.toml", SCENE.replace("filter = \"tent\"\n", ""));
+    assert!(image(&bench, "silent.toml --filter blackman-harris") == image(&bench, "silent.toml"));
+    let told = bench.expect("s.toml --filter mitchell --pixel 3,4", 0);
+    assert!(text(&told.stdout).contains("filter mitchell: the sample counts "), "{}", text(&told.stdout));
 }
 
 #[test]
@@ -259,7 +280,7 @@ fn warnings_are_shown_counted_silenced_or_taken_for_errors() {
     bench.write("odd.toml", SCENE.replace("[material]\n", "[material]\nunused = { color = [1, 1, 1] }\n"));
     let out = bench.expect("odd.toml -o odd.png --stats odd.json", 0);
     let said = text(&out.stderr);
-    assert!(said.contains("warning: ") && said.contains("--> odd.toml:29:1"), "{said}");
+    assert!(said.contains("warning: ") && said.contains("--> odd.toml:30:1"), "{said}");
     let stats: Value = serde_json::from_slice(&bench.read("odd.json")).unwrap();
     assert_eq!((&stats["warnings"], &stats["skipped"]["unused_materials"]), (&1.into(), &1.into()));
     assert!(bench.expect("odd.toml -o odd.png -q", 0).stderr.is_empty());
@@ -268,7 +289,7 @@ fn warnings_are_shown_counted_silenced_or_taken_for_errors() {
     for words in ["odd.toml --strict -o none.png", "odd.toml --strict -q -o none.png", "check odd.toml --strict"] {
         let out = bench.expect(words, 3);
         let said = text(&out.stderr);
-        assert!(said.starts_with("error: ") && said.contains("odd.toml:29:1") && said.contains("--strict"), "{said}");
+        assert!(said.starts_with("error: ") && said.contains("odd.toml:30:1") && said.contains("--strict"), "{said}");
         assert!(!said.contains("warning: ") && out.stdout.is_empty(), "{said}");
     }
     assert!(!bench.path("none.png").exists());
@@ -299,6 +320,8 @@ fn a_course_scene_is_written_as_the_courses_program_writes() {
     {
         assert_setting(&bench, "s.ray", [name, value, "scene file"]);
     }
+    assert_setting(&bench, "s.ray", ["filter", "box", "scene file"]);
+    assert!(text(&bench.expect("s.ray --filter tent", 2).stderr).contains("jitter_radius"));
     assert_setting(&bench, "s.ray", ["tonemap", "stretch", "scene file"]);
     assert_setting(&bench, "s.ray --spp 5", ["light-samples", "3", "scene file"]);
     assert_setting(&bench, "s.ray", ["clip", "2,50", "scene file"]);

@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 use tison::backend::BackendKind;
 use tison::film::{Aov, Film};
+use tison::math::Filter;
 use tison::render::{self, Adapted, Control, Ended, Job, Outcome, Stop};
 
 /// A ball and its soft shadow on a floor, through a lens: flat parts, edges, and much that is out of focus.
@@ -138,6 +139,20 @@ fn a_picture_knows_its_error() {
             let share = outcome.stats.rays_for_estimate as f64 / outcome.stats.rays.total() as f64;
             assert!((0.2..0.3).contains(&share), "{share}: one pixel in four");
         }
+    }
+}
+
+#[test]
+fn filtered_pictures_know_their_error_too() {
+    let still = load(STILL);
+    for filter in Filter::ALL {
+        let plain = Job { filter, spp: 1024, seed: 999, ..job(60, 40) };
+        let truth = render(BackendKind::Native, &still, &plain).film;
+        let adaptive = Job { stop: Stop::Rmse(0.003), spp: 4096, seed: 1, ..plain };
+        let outcome = render(BackendKind::Native, &still, &adaptive);
+        assert_eq!(adapted(&outcome).ended, Ended::Enough);
+        let (estimate, error) = (outcome.stats.sampling_rmse.expect("it is adaptive"), rmse(&outcome.film, &truth));
+        assert!((0.5..2.0).contains(&(estimate / error)), "{filter:?}: {estimate} for {error}");
     }
 }
 

@@ -7,19 +7,23 @@ use super::{Options, Progress};
 use crate::bench::cost::median;
 use crate::film::{Encoding, Film, Picture};
 use crate::metrics::{self, PIXELS_PER_DEGREE};
-use crate::render::{self, Job, Outcome};
+use crate::render::{self, Job, Outcome, RenderStats};
 
 /// Samples a pixel of the pictures that are kept for people to look at.
 pub const SHOWN: [u32; 2] = [16, 256];
 /// Seconds below which a picture is rendered again to time it, and how often at most.
 const TOO_SHORT: f64 = 0.02;
 const MOST_TIMES: usize = 5;
+/// Samples of the pictures that nobody looks at.
+const FIRST: u32 = 16;
 
 /// What came of one candidate at one number of samples: medians over the seeds.
 #[derive(Clone, Copy, Debug)]
 pub struct Point {
-    /// Samples a pixel; the mean where they differ.
+    /// Samples a pixel; where they differ the mean, with the share that the estimate of the error adds.
     pub spp: f64,
+    /// What it aimed at, in RMSE.
+    pub target: Option<f64>,
     /// Of the render loop.
     pub seconds: f64,
     /// As measured, with the reference's noise in it.
@@ -101,7 +105,7 @@ impl Measured {
             let Some(found) = run.level(candidates, &who, spp, options.seeds.max(1))? else { return Ok(all) };
             for (&i, seeds) in who.iter().zip(found) {
                 let figures: Vec<Figures> = seeds.iter().map(|s| s.figures).collect();
-                all.curves[i].points.push(run.point(&figures));
+                all.curves[i].points.push(run.point(candidates[i].target(spp), &figures));
                 if let (true, Some(seed)) =
                     (SHOWN.contains(&spp) && [OURS, BASELINE].contains(&i), seeds.into_iter().next())
                 {
@@ -116,6 +120,12 @@ impl Measured {
     pub fn is_empty(&self) -> bool {
         self.curves.iter().all(|c| c.points.is_empty())
     }
+}
+
+/// All samples of a picture, with as many more as the rays that only estimate its error are.
+fn samples(stats: &RenderStats) -> f64 {
+    let more = stats.rays_for_estimate as f64 / stats.rays.total() as f64;
+    stats.samples as f64 * (1.0 + more)
 }
 
 /// What is measured of one picture.
@@ -149,7 +159,7 @@ impl Run<'_> {
     /// Caches, and threads that sleep.
     fn warm_up(&self, candidates: &[Candidate]) -> Result<(), String> {
         for candidate in candidates {
-            self.picture(candidate, &self.job(candidate, 4, 0))?;
+            self.picture(candidate, &self.job(candidate, FIRST, 0))?;
         }
         Ok(())
     }
@@ -168,16 +178,14 @@ impl Run<'_> {
                 self.progress.begin(self.subject.pixels(), spp);
                 let job = self.job(&candidates[i], spp, seed);
                 let Some(outcome) = self.picture(&candidates[i], &job)? else { return Ok(None) };
-                found.push(self.measured(outcome, &job));
+                found.push(self.measured(outcome));
             }
         }
         Ok(Some(found))
     }
 
     fn job(&self, candidate: &Candidate, spp: u32, seed: u32) -> Job {
-        let mut job = Job { spp, seed, ..self.subject.job.clone() };
-        (candidate.set)(&mut job);
-        job
+        candidate.job(spp, Job { seed, ..self.subject.job.clone() })
     }
 
     /// A finished picture with the median of its times; nothing if it was stopped.
@@ -187,7 +195,7 @@ impl Run<'_> {
         let mut seconds = Vec::new();
         loop {
             let mut outcome = render::run(scene, camera, backend, job, self.progress.watch.control)?;
-            if !outcome.film.is_complete() {
+            if self.progress.watch.control.is_cancelled() {
                 return Ok(None);
             }
             seconds.push(outcome.stats.seconds);
@@ -198,7 +206,7 @@ impl Run<'_> {
         }
     }
 
-    fn measured(&self, Outcome { film, stats }: Outcome, job: &Job) -> OfSeed {
+    fn measured(&self, Outcome { film, stats }: Outcome) -> OfSeed {
         let (width, height) = (film.width, film.height);
         let picture =
             Picture { width, height, encoding: Encoding::Linear, pixels: film.color.clone(), transparent: false };
@@ -206,7 +214,7 @@ impl Run<'_> {
             .expect("they are of one size, and the eye's field is the usual one");
         let v = report.values;
         let figures = Figures {
-            spp: f64::from(job.spp),
+            spp: samples(&stats) / self.subject.pixels() as f64,
             seconds: stats.seconds,
             rmse: v.rmse,
             rmse_smooth: self.reference.rmse_of_smooth(&film),
@@ -221,12 +229,13 @@ impl Run<'_> {
         OfSeed { figures, film }
     }
 
-    fn point(&self, seeds: &[Figures]) -> Point {
+    fn point(&self, target: Option<f64>, seeds: &[Figures]) -> Point {
         let of = |f: fn(&Figures) -> f64| median(seeds.iter().map(f).collect());
         let (noise, noise_smooth) = (self.reference.noise, self.reference.noise_smooth);
         let (rmse, smooth) = (of(|f| f.rmse), of(|f| f.rmse_smooth));
         Point {
             spp: of(|f| f.spp),
+            target,
             seconds: of(|f| f.seconds),
             rmse_measured: rmse,
             rmse: without_noise(rmse, noise),

@@ -22,9 +22,9 @@ pub struct Reference {
     variance: Vec<[f64; 3]>,
     /// RMSE of the picture itself, from that.
     pub noise: f64,
-    /// Of each pixel: whether it is smooth.
-    pub smooth: Vec<bool>,
-    /// RMSE of the smooth pixels themselves.
+    /// Of each pixel: whether it is smooth; of none if there are too few to tell about.
+    smooth: Vec<bool>,
+    /// RMSE of the smooth pixels themselves; NaN if there are none.
     pub noise_smooth: f64,
 }
 
@@ -42,7 +42,7 @@ impl Reference {
             let job = Job { spp, seed: FIRST_SEED + block, min_weight: 0.0, ..subject.job.clone() };
             let backend = subject.backend(BackendKind::Native);
             let film = render::run(&subject.scene, &subject.camera, backend, &job, control)?.film;
-            if !film.is_complete() {
+            if control.is_cancelled() {
                 return Ok(None);
             }
             blocks.push(film);
@@ -69,8 +69,12 @@ impl Reference {
         Self { spp, picture, variance, noise, smooth: Vec::new(), noise_smooth: f64::NAN }
     }
 
-    /// The same, knowing which pixels are smooth.
-    pub fn with_smooth(self, smooth: Vec<bool>) -> Self {
+    /// The same, knowing which pixels are smooth. Fewer than one in a hundred are not looked at.
+    pub fn with_smooth(self, mut smooth: Vec<bool>) -> Self {
+        const FEW: usize = 100;
+        if FEW * smooth.iter().filter(|&&s| s).count() < smooth.len() {
+            smooth.fill(false);
+        }
         Self { noise_smooth: root_mean(&self.variance, &smooth), smooth, ..self }
     }
 
@@ -124,6 +128,11 @@ mod tests {
         assert_eq!((r.noise_smooth, r.smooth_share()), (0.0, 0.5));
         assert!((r.rmse_of_smooth(&film(vec![[9.0; 3], [1.5, 1.0, 1.0]])) - (0.25f64 / 3.0).sqrt()).abs() < 1e-15);
         assert!(r.with_smooth(vec![false; 2]).rmse_of_smooth(&blocks[0]).is_nan());
+        let many = [0.0, 1.0].map(|v| film(vec![[v; 3]; 200]));
+        let r = Reference::of(&many, 1);
+        let first = |n| (0..200).map(|i| i < n).collect::<Vec<_>>();
+        assert_eq!(r.clone().with_smooth(first(2)).smooth_share(), 0.01);
+        assert_eq!(r.with_smooth(first(1)).smooth_share(), 0.0, "one of 200 is too few");
     }
 
     #[test]

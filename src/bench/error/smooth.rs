@@ -26,10 +26,10 @@ const LIGHTS: usize = 64;
 /// In words, for the report.
 pub const DEFINITION: &str = "A pixel is smooth if all of 256 rays through it and the lens meet the same primitive with \
     normals alike (cosine above 0.9), all see the same lights unoccluded (one point each of those that have a size), and \
-    the material neither mirrors nor refracts nor has an image. For this, pixel, lens and lights are taken as 1.2 times as \
+    the material neither mirrors nor refracts nor has an image. For this, pixel, lens and lights are taken as 1.5 times as \
     wide as they are: an edge that 256 rays may miss shows in 4096.";
 /// How much wider.
-const WIDER: f64 = 1.2;
+const WIDER: f64 = 1.5;
 
 /// Of each pixel, row by row: whether it is smooth.
 ///
@@ -41,7 +41,7 @@ pub fn pixels(subject: &Subject) -> Result<Vec<bool>, String> {
     let camera = wide.prepare(&subject.scene.frame, subject.job.size)?;
     let jitter_radius = WIDER * subject.job.jitter_radius;
     let job = Job { spp: SAMPLES, seed: SEED, jitter_radius, ..subject.job.clone() };
-    let sampling = job.sampling();
+    let sampling = job.sampling(&camera);
     let backend = subject.backend(BackendKind::Native);
     let row = |y: u32| {
         let mut look = Look {

@@ -30,8 +30,8 @@ pub struct Subject {
     pub name: String,
     pub scene: Scene,
     pub camera: CameraDesc,
-    /// As the command renders it but for the number of samples: with its depth and its weight cut, one ray at each
-    /// light that has a size.
+    /// As the command renders it but for the number of samples and the filter, a box unless the scene says otherwise:
+    /// with its depth and its weight cut, one ray at each light that has a size.
     pub job: Job,
     backends: Vec<Built>,
 }
@@ -68,6 +68,7 @@ impl Subject {
         let job = Job {
             k_max: said.recursion.unwrap_or(whole.k_max),
             min_weight: said.min_weight.unwrap_or(MIN_WEIGHT),
+            filter: said.filter.unwrap_or(whole.filter),
             jitter_radius: said.jitter_radius.unwrap_or(whole.jitter_radius),
             ..whole
         };

@@ -13,8 +13,9 @@ use serde_json::{Value, json};
 
 /// What is measured, and how.
 pub const ABOUT: &str = "Small pictures with more and more samples, against a reference with many. Errors are of linear \
-    light; seconds are those of the render loop on all threads, medians over the seeds like every other figure. Pixels \
-    are averaged over their square (a box filter).";
+    light; seconds are those of the render loop on all threads, medians over the seeds like every other figure. The \
+    last part is about single rays: what is wrong with the numbers, over \
+    the time that a ray takes.";
 
 /// RMSE that everybody is to reach.
 const LEVELS: [f64; 3] = [1e-2, 3e-3, 1e-3];
@@ -50,7 +51,7 @@ pub fn sections(subject: &Subject, reference: &Reference, measured: &Measured, o
     let repeat = repeat(subject, reference, options);
     vec![
         Section { repeat: repeat.clone(), ..figures(subject, reference, measured) },
-        Section { repeat: repeat.clone(), ..slopes(subject, reference, measured) },
+        Section { repeat: repeat.clone(), ..slopes(subject, measured) },
         Section { repeat, ..reached(subject, measured) },
     ]
 }
@@ -90,7 +91,7 @@ fn figures(subject: &Subject, reference: &Reference, measured: &Measured) -> Sec
             let name = curve.candidate.name;
             table.rows.push(row(name, p));
             data.push(json!({
-                "scene": subject.name, "candidate": name, "spp": p.spp, "seconds": p.seconds, "rmse": p.rmse,
+                "scene": subject.name, "candidate": name, "target": p.target, "spp": p.spp, "seconds": p.seconds, "rmse": p.rmse,
                 "rmse_measured": p.rmse_measured, "reference_noise": reference.noise,
                 "rmse_smooth": finite(p.rmse_smooth), "reference_noise_smooth": finite(reference.noise_smooth),
                 "relmse": p.relmse, "relmse_trimmed": p.relmse_trimmed, "smape": p.smape, "max": p.max,
@@ -115,7 +116,7 @@ fn row(name: &str, p: &Point) -> Vec<String> {
     let lost = |value: f64, lost: bool| if lost { format!("({value:.2e})") } else { format!("{value:.2e}") };
     let or_none = |value: f64, text: String| if value.is_nan() { "-".to_owned() } else { text };
     vec![
-        name.to_owned(),
+        p.target.map_or(name.to_owned(), |t| format!("{name} to {t:.0e}")),
         samples(p.spp),
         format!("{:.2e}", p.seconds),
         lost(p.rmse, p.is_lost),
@@ -134,19 +135,25 @@ fn row(name: &str, p: &Point) -> Vec<String> {
 fn about(subject: &Subject, reference: &Reference) -> String {
     let job = &subject.job;
     let (width, height) = job.size;
+    let smooth = match reference.smooth_share() {
+        0.0 => "Of smooth pixels there are too few to tell about.".to_owned(),
+        share => format!(
+            "Smooth: RMSE of the {:.1} % smooth pixels, where the reference's is {:.1e}.",
+            100.0 * share,
+            reference.noise_smooth
+        ),
+    };
     format!(
-        "{width}x{height} pixels, {} bounces. The reference: {BLOCKS} blocks of {} samples a pixel with seeds of their own, by \
-         the native backend in f64, the whole tree of rays, no adaptivity, added up in f64. Its own RMSE, from the spread \
-         between the blocks, is {:.2e}. The RMSE of the table are without it (the root of the difference of the squares); \
-         where less than that noise is left it is in brackets, and plots and slopes end before it. The other figures are \
-         as measured. Smooth: RMSE of the {:.1} % smooth pixels, where the reference's is {:.1e}. {} relMSE is trimmed of \
-         the worst 0.1 %; FLIP and SSIM are of sRGB. One sample goes through the pixel's middle. Hierarchies were built \
-         before: {}.",
+        "{width}x{height} pixels, filter {}, rays bounce {} times at most. The reference: {BLOCKS} blocks of {} samples a \
+         pixel with seeds of their own, by the native backend in f64, the whole tree of rays, no adaptivity, added up in \
+         f64. Its own RMSE, from the spread between the blocks, is {:.2e}. The RMSE of the table are without it (the root \
+         of the difference of the squares); where less than that noise is left it is in brackets, and plots and slopes end \
+         before it. The other figures are as measured. {smooth} {} relMSE is trimmed of the worst 0.1 %; FLIP and SSIM are \
+         of sRGB. One sample without a lens goes through the pixel's middle. Hierarchies were built before: {}.",
+        job.filter.name(),
         job.k_max,
         reference.spp,
         reference.noise,
-        100.0 * reference.smooth_share(),
-        reference.noise_smooth,
         smooth::DEFINITION,
         subject.build_seconds()
     )
@@ -175,7 +182,7 @@ fn line(curve: &Curve, points: Vec<(f64, f64)>) -> Line {
     Line { name: format!("{}{slope}", curve.candidate.name), points }
 }
 
-fn slopes(subject: &Subject, reference: &Reference, measured: &Measured) -> Section {
+fn slopes(subject: &Subject, measured: &Measured) -> Section {
     let mut table =
         Table::new(&["candidate", "by samples", "from 16 samples", "by seconds", "smooth, by samples", "points"]);
     let mut data = Vec::new();
@@ -202,9 +209,8 @@ fn slopes(subject: &Subject, reference: &Reference, measured: &Measured) -> Sect
         title: format!("{}: how fast the error falls", subject.name),
         about: format!(
             "Slopes of log RMSE, fitted by least squares over the last {LAST} points that are more than the reference's \
-             noise ({:.1e}; {:.1e} of the smooth pixels). Independent random numbers give -0.5, at edges and on smooth \
-             pixels alike; good points about -0.66 or better at edges, and -1 to -1.5 on smooth pixels.",
-            reference.noise, reference.noise_smooth
+             noise. Independent random numbers give -0.5, at edges and on smooth \
+             pixels alike; good points about -0.66 or better at edges, and -1 to -1.5 on smooth pixels."
         ),
         repeat: String::new(),
         table,
@@ -220,21 +226,20 @@ fn reached(subject: &Subject, measured: &Measured) -> Section {
     let mut data = Vec::new();
     for (curve, level) in LEVELS.iter().flat_map(|&level| measured.curves.iter().map(move |c| (c, level))) {
         let [spp, seconds] = [by_samples, by_seconds].map(|by| fit::reaches(&by(curve), level));
-        let [base_spp, base_seconds] = [by_samples, by_seconds].map(|by| fit::reaches(&by(baseline), level));
-        let factor = |own: Option<f64>, base: Option<f64>| Some(base? / own?);
-        let (fewer, less) = (factor(spp, base_spp), factor(seconds, base_seconds));
-        let times = |f: Option<f64>| f.map_or("-".into(), |f| format!("{f:.2}x"));
+        let fewer = Factor::of(spp, &by_samples(baseline), level);
+        let less = Factor::of(seconds, &by_seconds(baseline), level);
         table.rows.push(vec![
             curve.candidate.name.into(),
             format!("{level:.0e}"),
             spp.map_or("not reached".into(), samples),
             seconds.map_or("not reached".into(), |s| format!("{s:.2e}")),
-            times(fewer),
-            times(less),
+            Factor::text(fewer),
+            Factor::text(less),
         ]);
         data.push(json!({
             "scene": subject.name, "candidate": curve.candidate.name, "rmse": level, "spp": spp, "seconds": seconds,
-            "fewer_samples": fewer, "less_time": less,
+            "fewer_samples": fewer.map(|f| f.times), "fewer_samples_at_least": fewer.map(|f| f.at_least),
+            "less_time": less.map(|f| f.times), "less_time_at_least": less.map(|f| f.at_least),
         }));
     }
     Section {
@@ -242,7 +247,8 @@ fn reached(subject: &Subject, measured: &Measured) -> Section {
         title: format!("{}: what it takes to get there", subject.name),
         about: format!(
             "Samples a pixel and seconds at which the RMSE is first down to a level, between two points as the line in the \
-             plot has it, and how many times fewer and less that is than for {}.",
+             plot has it, and how many times fewer and less that is than for {}; at least so many where that does not get \
+             there. Samples of who is adaptive are the mean, with those that only estimate the error.",
             baseline.candidate.name
         ),
         repeat: String::new(),
@@ -250,6 +256,28 @@ fn reached(subject: &Subject, measured: &Measured) -> Section {
         data: Value::Array(data),
         plots: vec![],
         pictures: vec![],
+    }
+}
+
+/// How many times less somebody takes than the baseline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Factor {
+    times: f64,
+    /// The baseline does not get there: it is known only what it takes without getting there.
+    at_least: bool,
+}
+
+impl Factor {
+    fn of(own: Option<f64>, baseline: &[(f64, f64)], level: f64) -> Option<Self> {
+        let (base, at_least) = match fit::reaches(baseline, level) {
+            Some(base) => (base, false),
+            None => (baseline.last()?.0, true),
+        };
+        Some(Self { times: base / own?, at_least })
+    }
+
+    fn text(of: Option<Self>) -> String {
+        of.map_or("-".into(), |f| format!("{}{:.2}x", if f.at_least { "> " } else { "" }, f.times))
     }
 }
 
@@ -290,4 +318,50 @@ fn samples(n: f64) -> String {
 /// With a sign, for slopes.
 fn signed(x: f64) -> String {
     format!("{x:+.2}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::candidates;
+    use super::*;
+
+    #[test]
+    fn what_is_lost_in_the_noise_and_all_after_it_is_not_fitted() {
+        let point = |spp: f64, is_lost| Point {
+            spp,
+            target: None,
+            seconds: 1e-3 * spp,
+            rmse_measured: 1.0 / spp,
+            rmse: 1.0 / spp,
+            is_lost,
+            rmse_smooth: f64::NAN,
+            smooth_is_lost: false,
+            relmse: 0.0,
+            relmse_trimmed: 0.0,
+            smape: 0.0,
+            max: 0.0,
+            beyond_1_255: 0.0,
+            flip: 0.0,
+            ssim: f64::NAN,
+        };
+        let points = [(1.0, false), (4.0, false), (16.0, true), (64.0, false)].map(|(spp, lost)| point(spp, lost));
+        let candidate = candidates::all(&Options::quick(vec![])).swap_remove(0);
+        let curve = Curve { candidate, points: points.to_vec() };
+        assert_eq!(by_samples(&curve), [(1.0, 1.0), (4.0, 0.25)]);
+        assert_eq!(by_seconds(&curve), [(1e-3, 1.0), (4e-3, 0.25)]);
+        assert_eq!(smooth_by_samples(&curve), [], "there are no smooth pixels");
+        assert!(line(&curve, by_samples(&curve)).name.ends_with("  -1.00"));
+        assert_eq!(row("a", &points[2])[3..5], ["(6.25e-2)".to_owned(), "-".to_owned()]);
+        assert!((points[0].efficiency() - 1e3).abs() < 1e-9);
+    }
+
+    #[test]
+    fn factors_are_bounds_where_the_baseline_does_not_get_there() {
+        let baseline = [(1.0, 1.0), (100.0, 0.1)];
+        let text = |own, level| Factor::text(Factor::of(own, &baseline, level));
+        assert_eq!(text(Some(10.0), 0.1), "10.00x");
+        assert_eq!(text(Some(50.0), 0.05), "> 2.00x");
+        assert_eq!(text(None, 0.1), "-");
+        assert_eq!(Factor::of(Some(1.0), &[], 0.1), None);
+    }
 }

@@ -36,7 +36,7 @@ pub struct ErrorArgs {
     /// Samples per pixel of each of the four blocks of the reference [default: 4096, with --full 16384]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), allow_negative_numbers = true)]
     reference: Option<u32>,
-    /// Every candidate as many samples as ours, five seeds, a reference of 65536 samples: takes about an hour
+    /// Every candidate as many samples as ours, five seeds, a reference of 65536 samples: takes five times as long
     #[arg(long)]
     full: bool,
     /// Parts to measure: the error that samples leave in pictures, the error of the numbers of single rays [default: both]

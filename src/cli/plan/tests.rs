@@ -121,6 +121,8 @@ fn what_cannot_be_is_refused() {
         ("a.obj --exposure 65", "from -64 to 64"),
         ("a.obj --lens-sampler polr", "'polar'"),
         ("a.obj --sampler sobel", "'sobol'"),
+        ("a.obj --filter mitchel", "'mitchell'"),
+        ("a.obj --filter tent", "changes nothing with one sample a pixel"),
         ("a.obj --light-samples 0", "0 is not in 1.."),
         ("a.obj -r 100001", "100001 is not in"),
         ("a.obj --camera frnt", "did you mean 'front'?"),

@@ -12,6 +12,7 @@ fn said() -> RenderDesc {
         min_weight: Some(0.25),
         seed: Some(7),
         jitter_radius: Some(0.25),
+        filter: Some(Filter::Box),
         sampler: Some(Sampler::Random),
         lens_sampler: Some(LensSampler::Polar),
         ..RenderDesc::default()
@@ -40,6 +41,7 @@ fn each_setting_is_the_flags_else_the_scenes_else_the_default() {
         ("recursion", "-r=50", ["8", "3", "50"]),
         ("min-weight", "--min-weight 0.5", ["0.0009765625", "0.25", "0.5"]),
         ("seed", "--seed 9", ["0", "7", "9"]),
+        ("filter", "--filter box", ["blackman-harris", "box", "box"]),
         ("sampler", "--sampler stratified", ["sobol", "random", "stratified"]),
         ("lens-sampler", "--lens-sampler rejection", ["concentric", "polar", "rejection"]),
     ];
@@ -69,6 +71,34 @@ fn what_is_shown_is_what_the_job_does() {
     assert_eq!((job.size, job.spp, job.k_max, job.seed), ((8, 6), 2, 5, 1));
     assert_eq!((job.min_weight, job.light_samples, job.lens_sampler), (0.0, 9, LensSampler::Rejection));
     assert_eq!(job.sampler, Sampler::Sobol);
+}
+
+#[test]
+fn the_filter_is_a_bell_unless_there_is_reason_for_a_box() {
+    let silent = RenderDesc::default();
+    let with = |filter| RenderDesc { filter: Some(filter), ..RenderDesc::default() };
+    let course = RenderDesc { course_rules: true, ..RenderDesc::default() };
+    let wide = RenderDesc { jitter_radius: Some(2.0), ..RenderDesc::default() };
+    for (flags, render, want, origin) in [
+        ("a.toml", &silent, Filter::BlackmanHarris, Origin::Default),
+        ("a.obj --spp 2", &silent, Filter::BlackmanHarris, Origin::Default),
+        ("a.obj", &silent, Filter::Box, Origin::Default),
+        ("a.toml", &with(Filter::Tent), Filter::Tent, Origin::Scene),
+        ("a.toml -D render.filter=tent", &with(Filter::Tent), Filter::Tent, Origin::Define),
+        ("a.toml --spp 1", &with(Filter::Tent), Filter::Tent, Origin::Scene),
+        ("a.toml --filter mitchell", &with(Filter::Tent), Filter::Mitchell, Origin::Flag),
+        ("a.obj --filter box", &silent, Filter::Box, Origin::Flag),
+        ("a.ray", &course, Filter::Box, Origin::Scene),
+        ("a.ray --filter tent", &course, Filter::Tent, Origin::Flag),
+        ("a.toml", &wide, Filter::Box, Origin::Scene),
+        ("a.toml --filter box", &wide, Filter::Box, Origin::Flag),
+    ] {
+        let settings = settings(flags, render);
+        let shown = settings.list.iter().find(|s| s.name == "filter").expect("it is shown");
+        assert_eq!((settings.job.filter, shown.value.as_str(), shown.origin), (want, want.name(), origin), "{flags}");
+    }
+    assert!(refused("a.toml --filter tent", &wide).contains("sets jitter_radius"));
+    assert!(refused("a.toml --filter tent --spp 1", &silent).contains("add --spp 16"));
 }
 
 #[test]

@@ -224,6 +224,20 @@ fn points_on_lights_are_stratified_and_differ_by_light_and_branch() {
 }
 
 #[test]
+fn without_a_lens_the_first_light_has_its_dimensions_and_no_two_lights_share_any() {
+    let with = of(Sampler::Sobol, 5, 16);
+    let without = with.without_lens();
+    let points =
+        |sampling: &Sampling, light| (0..16).map(|i| sampling.pixel(8, 1).on_light(i, light, Branch::CAMERA)).collect();
+    let lens: Vec<_> = (0..16).map(|i| with.pixel(8, 1).point(i)).map(|[.., u, v]| [u, v]).collect();
+    let lights: Vec<Vec<_>> = (0..4).map(|light| points(&without, light)).collect();
+    assert_eq!(lights[0], lens);
+    let moved: Vec<Vec<_>> = (0..3).map(|light| points(&with, light)).collect();
+    assert_eq!(lights[1..], moved);
+    assert!((0..4).all(|a| (0..a).all(|b| lights[a] != lights[b])));
+}
+
+#[test]
 fn the_disc_is_covered_uniformly() {
     let n = 512;
     let points = (0..n * n).map(|i| {

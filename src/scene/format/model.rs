@@ -4,7 +4,7 @@ use super::diagnostic::Diagnostic;
 use super::reader::{Field, Table};
 use super::tree::{Context, Entry, Node, Span, Value};
 use super::{material, object};
-use crate::math::Sampler;
+use crate::math::{Filter, Sampler};
 use crate::scene::desc::{Falloff, LensSampler, LightDesc, NamedCamera, Place, RenderDesc, SceneDesc};
 use crate::scene::{CameraDesc, Projection};
 use glam::DVec3;
@@ -65,6 +65,7 @@ fn render(ctx: &Context, entry: &Entry) -> RenderDesc {
     };
     let share = "a number from 0 to below 1: 0 traces every branch";
     let radius = "a number of pixels from 0 to 16";
+    let has_jitter_radius = t.has("jitter_radius");
     let desc = RenderDesc {
         size: t.opt("size").and_then(|f| f.size(MOST_PIXELS)),
         samples: t.opt("samples").and_then(|f| f.whole(1..=MOST_SAMPLES)),
@@ -74,12 +75,26 @@ fn render(ctx: &Context, entry: &Entry) -> RenderDesc {
         background: t.opt("background").and_then(|f| f.color()),
         ambient: t.opt("ambient").and_then(|f| f.color()),
         jitter_radius: t.opt("jitter_radius").and_then(|f| f.number(radius, |x| (0.0..=16.0).contains(&x))),
+        filter: t.opt("filter").and_then(|f| filter(ctx, &f, has_jitter_radius)),
         sampler: t.opt("sampler").and_then(|f| f.choice(&Sampler::ALL.map(|s| (s.name(), s)))),
         lens_sampler: t.opt("lens_sampler").and_then(|f| f.choice(&LensSampler::ALL.map(|s| (s.name(), s)))),
         course_rules: t.opt("course_rules").and_then(|f| f.bool()).unwrap_or(false),
     };
     t.finish();
     desc
+}
+
+/// A pixel filter; other than the box they have a width of their own.
+fn filter(ctx: &Context, field: &Field<'_>, has_jitter_radius: bool) -> Option<Filter> {
+    let filter = field.choice(&Filter::ALL.map(|f| (f.name(), f)))?;
+    if has_jitter_radius && filter != Filter::Box {
+        ctx.error(field.node.span, |s| {
+            Diagnostic::error(s, format!("`filter` is \"{}\", but there is a `jitter_radius` too", filter.name()))
+                .expected("expected \"box\", the filter that has such a radius")
+                .help("leave one of the two out")
+        });
+    }
+    Some(filter)
 }
 
 #[derive(Clone, Copy)]

@@ -65,6 +65,9 @@ impl Writer {
         self.opt("background", r.background);
         self.opt("ambient", r.ambient);
         self.opt("jitter_radius", r.jitter_radius);
+        if let Some(filter) = r.filter {
+            self.text("filter", filter.name());
+        }
         if let Some(sampler) = r.sampler {
             self.text("sampler", sampler.name());
         }
