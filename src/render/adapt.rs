@@ -93,7 +93,8 @@ impl Allocation<'_> {
         let allowed = target * target * self.pixels.len() as f64;
         let highest = self.pixels.iter().map(|p| self.gain(self.factor * p.error, p.taken)).fold(0.0, f64::max);
         if highest == 0.0 {
-            return vec![0; self.pixels.len()];
+            // The samples of each pixel agree, and yet there is an error: nothing tells where.
+            return self.pixels.iter().map(|p| u64::from(p.taken.min(self.most - p.taken))).collect();
         }
         // At 2^-60 of the highest price all pixels have the most samples they can have.
         let (mut low, mut high) = (-60.0, 0.0);
@@ -228,6 +229,15 @@ mod tests {
             "{own:?} {next:?}"
         );
         assert_eq!(far.taken, 64);
+    }
+
+    #[test]
+    fn an_error_that_no_pixel_shows_is_looked_for_everywhere() {
+        let mut pixels = flat();
+        assert!(!choose(&pixels, WIDTH, 1024, Goal::Rmse(0.1), 1.0).go_on.contains(&false));
+        pixels[3].taken = 1024;
+        let choice = choose(&pixels, WIDTH, 1024, Goal::Rmse(0.1), 1.0);
+        assert_eq!(choice.go_on.iter().filter(|&&goes| !goes).count(), 1, "who has the most stays");
     }
 
     #[test]

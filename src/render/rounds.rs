@@ -81,7 +81,8 @@ impl<'a, B: Backend, const SECONDARY: bool> Rounds<'a, B, SECONDARY> {
         self.outcome(rounds, ended)
     }
 
-    /// Works on all tiles, on all threads, until done, cancelled or out of time; `expected` are the samples at the end of all rounds.
+    /// Works on all tiles, on all threads, until done, cancelled or out of time; `expected` are the samples at the end of
+    /// all rounds.
     fn round(&self, expected: u64, work: impl Fn(&mut Area, &mut TileWorker<'a, B, SECONDARY>) -> bool + Sync) {
         let next = AtomicUsize::new(0);
         let first = self.samples.load(Relaxed) == 0;
@@ -130,11 +131,13 @@ impl<'a, B: Backend, const SECONDARY: bool> Rounds<'a, B, SECONDARY> {
     fn choose(&self, look: &Look) -> Result<Choice, Ended> {
         let job = self.render.job;
         let rmse = look.error.rmse().unwrap_or(f64::INFINITY);
+        let target = if let Stop::Rmse(target) = job.stop { target } else { 0.0 };
         let goal = match job.stop {
             Stop::Noise(threshold) => Goal::Noise(threshold),
-            Stop::Rmse(target) if rmse <= target => return Err(Ended::Enough),
-            Stop::Rmse(target) => Goal::Rmse(target.max(STEP * rmse)),
-            Stop::Count => Goal::Rmse(STEP * rmse),
+            Stop::Rmse(_) | Stop::Count if rmse > target => Goal::Rmse(target.max(STEP * rmse)),
+            // Fewer samples may agree by chance.
+            _ if look.pixels.iter().all(|p| p.taken >= FIRST.min(job.spp)) => return Err(Ended::Enough),
+            _ => Goal::Rmse(target),
         };
         let width = (job.crop.x1 - job.crop.x0) as usize;
         let choice = adapt::choose(&look.pixels, width, job.spp, goal, look.error.factor());
@@ -153,7 +156,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Rounds<'a, B, SECONDARY> {
         for (index, area) in self.areas.into_iter().enumerate() {
             let area = area.into_inner().unwrap_or_else(PoisonError::into_inner);
             area.hand_in::<SECONDARY>(index, job.crop, &mut sum);
-            stopped_early += area.progress().filter(|(_, p)| p.taken < job.spp).count() as u64;
+            stopped_early += area.progress().filter(|(_, p)| (1..job.spp).contains(&p.taken)).count() as u64;
         }
         control.pixels.store(self.pixels.0 + sum.film.finished as u64, Relaxed);
         self.render.outcome(self.common, sum, Some(Adapted { rounds, ended, stopped_early }))

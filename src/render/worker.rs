@@ -140,8 +140,12 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
     fn add_up_weighed(&self, sums: &mut [PixelSum], segment: &Segment<'_>, deviations: bool) {
         let (samples, job, gathered) = (segment.samples as usize, self.render.job, &self.waves.gathered);
         for (i, (sum, colors)) in sums.iter_mut().zip(gathered.color.chunks_exact(samples)).enumerate() {
-            let weights: Vec<f64> = (0..samples).map(|k| segment.weight((i * samples + k) as u32, job)).collect();
-            sum.add_weighed(colors.iter().copied().zip(weights.iter().copied()), deviations);
+            // A segment takes at most a packet's worth of each pixel.
+            let mut weights = [0.0; LANES];
+            for (k, weight) in weights[..samples].iter_mut().enumerate() {
+                *weight = segment.weight((i * samples + k) as u32, job);
+            }
+            sum.add_weighed(colors.iter().copied().zip(weights), deviations);
             let cuts = gathered.cut.get(i * samples..(i + 1) * samples).unwrap_or_default();
             for (cut, weight) in cuts.iter().zip(&weights) {
                 sum.cut[0] += cut[0] * weight.abs();
