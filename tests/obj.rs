@@ -8,22 +8,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use tempfile::TempDir;
 use tison::scene::Error;
-use tison::scene::obj::{MtlMaterial, ObjFile, ReadOptions, Reader, Uv, read};
+use tison::scene::obj::{MtlMaterial, ObjFile, ReadOptions, Uv, read};
 
 static GO_ON: AtomicBool = AtomicBool::new(false);
 
 fn options(allow: &[PathBuf]) -> ReadOptions<'_> {
-    ReadOptions {
-        reader: Reader::Own,
-        rests: false,
-        normals: true,
-        uv: Uv::Always,
-        materials: true,
-        allow,
-        cancel: &GO_ON,
-        free_memory: || None,
-        progress: None,
-    }
+    ReadOptions { allow, ..ReadOptions::all(&GO_ON) }
 }
 
 fn load(path: &Path) -> Result<ObjFile, Error> {

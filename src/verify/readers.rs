@@ -4,7 +4,7 @@
 //! Polygons are split by the same code from the corners that each of them read: equal triangles are equal
 //! polygons.
 
-use crate::scene::obj::{self, CornerData, ObjFile, ReadOptions, Reader, Uv};
+use crate::scene::obj::{self, CornerData, ObjFile, ReadOptions, Reader};
 use crate::scene::{Error, FreeMemory};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -51,17 +51,7 @@ pub fn compare(
     cancel: &AtomicBool,
     free_memory: FreeMemory,
 ) -> Result<Compared, Error> {
-    let options = |reader| ReadOptions {
-        reader,
-        normals: true,
-        uv: Uv::Always,
-        materials: true,
-        rests: false,
-        allow,
-        cancel,
-        free_memory,
-        progress: None,
-    };
+    let options = |reader| ReadOptions { reader, allow, free_memory, ..ReadOptions::all(cancel) };
     let own = obj::read(path, &options(Reader::Own))?;
     let mut compared = Compared {
         path: path.to_owned(),

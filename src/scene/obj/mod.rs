@@ -95,7 +95,23 @@ pub enum Uv {
     Always,
 }
 
-impl ReadOptions<'_> {
+impl<'a> ReadOptions<'a> {
+    /// All that a file has, by our own reader, whatever memory it takes.
+    #[must_use]
+    pub fn all(cancel: &'a AtomicBool) -> Self {
+        Self {
+            reader: Reader::default(),
+            normals: true,
+            uv: Uv::Always,
+            materials: true,
+            rests: false,
+            allow: &[],
+            cancel,
+            free_memory: || None,
+            progress: None,
+        }
+    }
+
     /// What holds for all that is read into memory.
     pub(super) fn limits(&self) -> Limits<'_> {
         Limits { cancel: self.cancel, free_memory: self.free_memory }

@@ -10,17 +10,7 @@ use std::fmt::Write as _;
 static GO_ON: AtomicBool = AtomicBool::new(false);
 
 fn options() -> ReadOptions<'static> {
-    ReadOptions {
-        reader: Reader::Own,
-        rests: false,
-        normals: true,
-        uv: Uv::Always,
-        materials: true,
-        allow: &[],
-        cancel: &GO_ON,
-        free_memory: || None,
-        progress: None,
-    }
+    ReadOptions::all(&GO_ON)
 }
 
 fn parse_in(bytes: &[u8], piece: u64) -> Result<ObjFile, Error> {

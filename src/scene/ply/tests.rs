@@ -1,6 +1,6 @@
 //! Odd files, and that neither parts nor threads nor the encoding change a result.
 
-use super::super::obj::{self, MtlMaterial, Reader, Uv};
+use super::super::obj::{self, MtlMaterial, Uv};
 use super::*;
 use crate::math::Frame;
 use glam::{DVec3, Vec3};
@@ -11,17 +11,7 @@ use std::sync::atomic::AtomicBool;
 static GO_ON: AtomicBool = AtomicBool::new(false);
 
 fn options() -> ReadOptions<'static> {
-    ReadOptions {
-        reader: Reader::Own,
-        rests: false,
-        normals: true,
-        uv: Uv::Always,
-        materials: true,
-        allow: &[],
-        cancel: &GO_ON,
-        free_memory: || None,
-        progress: None,
-    }
+    ReadOptions::all(&GO_ON)
 }
 
 fn parse_in(bytes: &[u8], piece: u64) -> Result<ObjFile, Error> {
