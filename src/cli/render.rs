@@ -454,6 +454,9 @@ fn merge(all: &mut RenderStats, one: &RenderStats, index: u32) {
     all.cut_off_mean += (one.cut_off_mean - all.cut_off_mean) / f64::from(index + 1);
     all.non_finite_samples += one.non_finite_samples;
     all.shadow_rays_facing_away += one.shadow_rays_facing_away;
+    all.shadow_rays_enclosed += one.shadow_rays_enclosed;
+    all.shadow_rays_faint += one.shadow_rays_faint;
+    all.rays_inside += one.rays_inside;
     all.branches_below_cut += one.branches_below_cut;
 }
 

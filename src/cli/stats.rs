@@ -38,6 +38,9 @@ pub fn skipped(report: &Report<'_>) -> Vec<(&'static str, Skipped)> {
         ("unused_textures", unused.textures as u64),
         ("lights_without_power", unused.lights as u64),
         ("shadow_rays_facing_away", report.done.stats.shadow_rays_facing_away),
+        ("shadow_rays_enclosed", report.done.stats.shadow_rays_enclosed),
+        ("shadow_rays_faint", report.done.stats.shadow_rays_faint),
+        ("traversals_inside_shapes", report.done.stats.rays_inside),
         ("branches_below_cut", report.done.stats.branches_below_cut),
         ("pixels_that_need_no_more", report.done.stats.adapted.map_or(0, |a| a.stopped_early)),
     ];

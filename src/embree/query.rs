@@ -217,7 +217,9 @@ impl Scene {
     #[inline(never)]
     fn intersect_singly<const N: usize>(&self, packet: &mut RayHitPacket<N>, live: usize) {
         for lane in 0..live.min(N) {
-            let hit = self.intersect(&packet.ray.get(lane));
+            let ray = packet.ray.get(lane);
+            // One that ends before it starts asks nothing.
+            let hit = if ray.t_far < ray.t_near { None } else { self.intersect(&ray) };
             packet.set_hit(lane, hit.as_ref());
         }
     }

@@ -21,6 +21,13 @@ impl Bounds {
         !self.lo.cmple(self.hi).all()
     }
 
+    /// Whether they have a point in common.
+    #[inline]
+    #[must_use]
+    pub fn meets(&self, other: &Self) -> bool {
+        self.lo.cmple(other.hi).all() && other.lo.cmple(self.hi).all()
+    }
+
     /// The smallest box that holds this one and `p`.
     #[must_use]
     pub fn with(self, p: DVec3) -> Self {

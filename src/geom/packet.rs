@@ -167,6 +167,17 @@ impl<const N: usize> RayHitPacket<N> {
     }
 }
 
+impl PacketBatch<RayHitPacket> {
+    /// Writes the answer of ray `ray`: object and primitive, and where along the ray.
+    #[inline]
+    pub fn answer(&mut self, ray: usize, [geom_id, prim_id]: [u32; 2], t: f32) {
+        let (packet, lane) = (&mut self.packets[ray / LANES], ray % LANES);
+        packet.ray.t_far[lane] = t;
+        packet.hit.geom_id[lane] = geom_id;
+        packet.hit.prim_id[lane] = prim_id;
+    }
+}
+
 /// What a [`PacketBatch`] is made of.
 pub trait RayQueue: Clone {
     /// A packet without rays.

@@ -110,6 +110,16 @@ impl<S> Default for Plain<S> {
 }
 
 impl<S: Shape> Plain<S> {
+    /// Shape number `prim`.
+    ///
+    /// # Panics
+    /// If there is none.
+    #[inline]
+    #[must_use]
+    pub fn get(&self, prim: u32) -> &S {
+        &self.shapes[prim as usize]
+    }
+
     /// Adds a shape and tells its number.
     pub fn push(&mut self, shape: S) -> u32 {
         let id = next_id(self.shapes.len());

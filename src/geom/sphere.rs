@@ -39,6 +39,12 @@ impl Sphere {
         Ok(Self { center, radius })
     }
 
+    /// One that was there before, taken apart.
+    #[inline(always)]
+    pub(crate) fn known(center: DVec3, radius: f64) -> Self {
+        Self { center, radius }
+    }
+
     /// Middle.
     #[must_use]
     pub fn center(&self) -> DVec3 {
@@ -58,6 +64,22 @@ impl Sphere {
         let scale = to_world.matrix3.x_axis.x;
         let plain = scale > 0.0 && to_world.matrix3 == DMat3::from_diagonal(DVec3::splat(scale));
         plain.then(|| Self::new(to_world.transform_point3(self.center), self.radius * scale).ok()).flatten()
+    }
+
+    /// [`refine_for`](Shape::refine_for) without texture coordinates and without a branch, for a loop over lanes: the
+    /// same bits. The point and the normal.
+    #[inline(always)]
+    pub(crate) fn refine_straight(&self, o: DVec3, d: DVec3, t_near: f64, reported: f64) -> (DVec3, DVec3) {
+        let t = self.quadratic(o, d).nearest(t_near, f64::INFINITY);
+        let t = if t < f64::INFINITY { t } else { reported };
+        let p = (o - self.center) + t * d;
+        let ng = p * inverse_length(p.dot(p), self.radius);
+        let finite = ng.x.is_finite() & ng.y.is_finite() & ng.z.is_finite();
+        let recip = 1.0 / d.dot(d).sqrt();
+        let back = if recip.is_finite() & (recip > 0.0) { -(d * recip) } else { DVec3::NEG_Z };
+        let pick = |a: f64, b: f64| if finite { a } else { b };
+        let ng = DVec3::new(pick(ng.x, back.x), pick(ng.y, back.y), pick(ng.z, back.z));
+        (self.center + self.radius * ng, ng)
     }
 
     /// `b^2 - a c` cancels when the origin is far. The distance of the line from the centre,

@@ -18,7 +18,7 @@ pub type F32 = [f32; LANES];
 pub type F64 = [f64; LANES];
 
 /// Half an f32 ulp of 1.
-const EPS: f64 = 0.5 * f32::EPSILON as f64;
+pub const EPS: f64 = 0.5 * f32::EPSILON as f64;
 
 /// Where a ray's colour goes and how much of it.
 #[derive(Clone, Copy, Debug)]
@@ -85,6 +85,8 @@ pub struct Block {
     pub front: [F32; 3],
     /// Whether the ray met the outer side.
     pub entering: [bool; LANES],
+    /// Whether the point is on the inner side of a shape that is convex and encloses a space.
+    pub enclosed: [bool; LANES],
     /// What the point shows by itself, and after the lights what they add; before the weight.
     pub color: [F32; 3],
 }
@@ -110,6 +112,7 @@ impl Block {
         to_eye: [[0.0; LANES]; 3],
         front: [[0.0; LANES]; 3],
         entering: [false; LANES],
+        enclosed: [false; LANES],
         color: [[0.0; LANES]; 3],
     };
 
@@ -310,7 +313,7 @@ pub fn leave(r: &Points, b: &mut Block) {
 
 /// `x` in f32, rounded towards the sign of `side`.
 #[inline(always)]
-fn round_away(x: f64, side: f64) -> f32 {
+pub fn round_away(x: f64, side: f64) -> f32 {
     let nearest = x as f32;
     let wide = f64::from(nearest);
     let bits = nearest.to_bits();

@@ -39,7 +39,7 @@ impl Contacts {
         boxes.sort_by(|a, b| a.1.lo.x.total_cmp(&b.1.lo.x));
         for (i, (id, own)) in boxes.iter().enumerate() {
             let from_here = boxes[i + 1..].iter().take_while(|(_, other)| other.lo.x <= own.hi.x);
-            for (other, theirs) in from_here.filter(|(_, other)| meet(own, other)).map(|(id, b)| (*id, b)) {
+            for (other, theirs) in from_here.filter(|(_, other)| own.meets(other)).map(|(id, b)| (*id, b)) {
                 debug_assert!(!theirs.is_empty());
                 contacts.neighbours.entry(*id).or_default().push(other);
                 contacts.neighbours.entry(other).or_default().push(*id);
@@ -48,11 +48,16 @@ impl Contacts {
         contacts
     }
 
-    /// Materials of the neighbours of `id` that a ray leaves, and of those it enters, on the way from
-    /// `before` to `behind`.
+    /// Materials of the neighbours of `id` that a ray leaves, and of those it enters, on the way between the
+    /// points before and behind the boundary that `both_sides` tells.
+    #[inline]
     #[must_use]
-    pub fn crossed(&self, scene: &Scene, id: Id, before: DVec3, behind: DVec3) -> Option<Crossed> {
+    pub fn crossed(&self, scene: &Scene, id: Id, both_sides: impl Fn() -> (DVec3, DVec3)) -> Option<Crossed> {
+        if self.neighbours.is_empty() {
+            return None;
+        }
         let neighbours = self.neighbours.get(&id)?;
+        let (before, behind) = both_sides();
         let mut crossed = Crossed::default();
         for &[geom, prim] in neighbours {
             let Object::Shapes(shapes) = &scene.objects[geom as usize] else { continue };
@@ -102,8 +107,4 @@ fn solids(scene: &Scene) -> Vec<(Id, Bounds)> {
 fn wider(b: Bounds) -> Bounds {
     let by = REACH * (b.size() + b.lo.abs().max(b.hi.abs())).max_element();
     Bounds { lo: b.lo - by, hi: b.hi + by }
-}
-
-fn meet(a: &Bounds, b: &Bounds) -> bool {
-    a.lo.cmple(b.hi).all() && b.lo.cmple(a.hi).all()
 }

@@ -1,16 +1,17 @@
 //! One pixel told in words: every ray of its first sample and what became of it.
 
+use super::aim::{self, Asked, Rules, Shine};
 use super::block::{Block, Path};
-use super::contacts::Contacts;
 use super::job::Job;
-use super::lights::{self, Lit, Target};
+use super::known::Known;
+use super::lights::{self, Lit};
 use super::media::Media;
-use super::shade;
+use super::shade::Onwards;
 use super::surface::SurfacePoint;
 use super::tile::Segment;
 use crate::backend::{AnyBackend, Backend};
 use crate::geom::{Coherence, Hit, LANES, PacketBatch, Ray, RayPacket};
-use crate::scene::{CameraDesc, Light, Scene};
+use crate::scene::{CameraDesc, Scene};
 use glam::{DVec3, Vec3};
 use std::fmt::Write;
 
@@ -51,7 +52,7 @@ struct Told<'a> {
     segment: Segment<'a>,
     seen_from: Option<DVec3>,
     clip: Option<(f64, f64)>,
-    contacts: Contacts,
+    known: Known,
     media: Media,
     out: String,
 }
@@ -74,7 +75,7 @@ impl<B: Backend> Teller<'_, B> {
             segment,
             seen_from: self.scene.course_rules.then_some(camera.eye),
             clip: camera.clip,
-            contacts: Contacts::of(self.scene),
+            known: Known::of(self.scene, &self.scene.needs(), self.job.k_max),
             media: Media::new(),
             out: String::new(),
         };
@@ -146,37 +147,36 @@ impl<B: Backend> Teller<'_, B> {
         let own = path.weight * Block::vec3(&block.color, 0);
         told.out += &format!("{indent}  ambient and emission: {}\n", rgb(own));
         let mut add = own;
-        for (i, light) in self.scene.lights.iter().enumerate() {
-            add += self.light(i as u32, light, &mut block, &indent, told);
+        for index in 0..told.known.lights.len() {
+            add += self.light(index, &mut block, &indent, told);
         }
-        self.branches(&path, &point, stack, told, &indent);
+        self.branches(&path, &block, stack, told, &indent);
         add
     }
 
     /// Tells about one light and returns what it adds.
-    fn light(&self, index: u32, light: &Light, block: &mut Block, indent: &str, told: &mut Told<'_>) -> Vec3 {
+    fn light(&self, index: usize, block: &mut Block, indent: &str, told: &mut Told<'_>) -> Vec3 {
+        let light = &told.known.lights[index];
+        let rules = Rules { faint: self.job.min_weight, outside: told.known.enclosures.is_outside(index) };
+        let (mut batch, mut shine) = (PacketBatch::<RayPacket>::default(), Shine::NONE);
+        let asked = aim::at_center(block, light, told.seen_from, rules, batch.push_packet(), &mut shine);
         let rounds = if light.radius > 0.0 { self.job.light_samples.max(1) } else { 1 };
         let (samples, sample) = told.segment.samples_of(0);
-        let (mut sent, mut away, mut through) = (0, 0, 0.0);
+        let mut through = 0.0;
         for round in 0..rounds {
-            let mut batch = PacketBatch::<RayPacket>::default();
-            let points = lights::points_on(block, light, |lane| {
-                samples.on_light(sample * rounds + round, index, block.branch[lane])
-            });
-            let target = if light.radius > 0.0 { Target::Points(&points) } else { Target::Center };
-            let counts = lights::aim(block, light, target, batch.push_packet());
-            (sent, away) = (sent + counts.0, away + counts.1);
+            if light.radius > 0.0 {
+                let points = lights::points_on(block, light, |lane| {
+                    samples.on_light(sample * rounds + round, index as u32, block.branch[lane])
+                });
+                batch.clear();
+                aim::at_points(block, &points, asked.sent, batch.push_packet());
+            }
             self.backend.occluded_many(&mut batch, Coherence::Coherent);
             through += lights::unoccluded(&batch.packets()[0])[0];
         }
         let visible = through / rounds as f32;
         if visible == 0.0 {
-            let why = match (sent, away) {
-                (0, 0) => "nothing to light",
-                (0, _) => "behind the surface",
-                _ => "in shadow",
-            };
-            told.out += &format!("{indent}  light {index}: {why}\n");
+            told.out += &format!("{indent}  light {index}: {}\n", why_dark(asked));
             return Vec3::ZERO;
         }
         block.color = [[0.0; LANES]; 3];
@@ -188,13 +188,14 @@ impl<B: Backend> Teller<'_, B> {
         lit
     }
 
-    fn branches(&self, path: &Path, point: &SurfacePoint, stack: &mut Vec<Pending>, told: &mut Told<'_>, indent: &str) {
-        let m = &self.scene.materials[point.material];
+    fn branches(&self, path: &Path, block: &Block, stack: &mut Vec<Pending>, told: &mut Told<'_>, indent: &str) {
+        let m = &self.scene.materials[block.material[0] as usize];
         if !(m.reflects() || m.refracts()) {
             return;
         }
-        let d: DVec3 = -point.to_eye.as_dvec3().normalize();
-        let sent = shade::onward(self.scene, &told.contacts, &mut told.media, point, path.medium, d);
+        let mut onwards = Onwards::default();
+        onwards.find(self.scene, &told.known.contacts, &mut told.media, block, 1);
+        let sent = onwards.lane(self.scene, block, 0);
         // The stack gives back the last first: the mirrored branch is told first.
         let ways = [("refracted", sent.refracted, 1, sent.behind), ("reflected", sent.reflected, 0, path.medium)];
         for (what, branch, kind, medium) in ways {
@@ -204,10 +205,20 @@ impl<B: Backend> Teller<'_, B> {
                 told.out += &format!("{indent}  {what} weight {:.6}: cut\n", weight.max_element());
                 continue;
             }
-            let ray = Ray::new(point.origin_towards(branch.d), branch.d.as_vec3());
+            let ray = Ray::new(branch.o, branch.d);
             let branch = path.branch.bounced(kind);
             stack.push(Pending { what, ray, path: Path { depth: path.depth + 1, weight, branch, medium, ..*path } });
         }
+    }
+}
+
+fn why_dark(asked: Asked) -> &'static str {
+    match asked {
+        Asked { sent: 1.., .. } => "in shadow",
+        Asked { facing_away: 1.., .. } => "behind the surface",
+        Asked { enclosed: 1.., .. } => "outside of the shape that the point is inside of",
+        Asked { faint: 1.., .. } => "too faint: cut",
+        _ => "nothing to light",
     }
 }
 

@@ -203,6 +203,7 @@ impl Hits for Facets<'_> {
 
     fn finish(&mut self, len: usize, scene: &Scene, palette: &Palette, block: &mut Block) {
         block.len = len;
+        block.enclosed = [false; LANES];
         self.gather(block, palette);
         simd::run(Finish { facets: self, block });
         palette.add_texels(scene, block, |_, lane| self.uv(lane));

@@ -204,6 +204,12 @@ pub struct RenderStats {
     pub non_finite_samples: u64,
     /// Shadow rays not sent because the light is behind the surface.
     pub shadow_rays_facing_away: u64,
+    /// Shadow rays not sent because they start inside of a closed shape and the light is outside.
+    pub shadow_rays_enclosed: u64,
+    /// Shadow rays not sent, after a bounce, because the light would have added less than the weight cut.
+    pub shadow_rays_faint: u64,
+    /// Rays inside of shapes that touch nothing: no backend was asked about them.
+    pub rays_inside: u64,
     /// Branches below the weight cut.
     pub branches_below_cut: u64,
 }

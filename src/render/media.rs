@@ -4,7 +4,6 @@ use super::block::Path;
 use super::contacts::Crossed;
 use crate::scene::Material;
 use glam::Vec3;
-use std::collections::HashMap;
 
 /// A number for the solids around a ray, made by [`Media`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -23,7 +22,6 @@ impl Medium {
 pub struct Media {
     /// The nesting without the last material, and that material.
     nestings: Vec<Nesting>,
-    entered: HashMap<(Medium, u32), Medium>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +29,16 @@ struct Nesting {
     outer: Medium,
     material: u32,
     depth: u32,
+    /// Of those with one material more, the one made last, and the one made before this one;
+    /// `OUTSIDE` ends the list.
+    inner: Medium,
+    sibling: Medium,
+}
+
+impl Nesting {
+    fn new(outer: Medium, material: u32, depth: u32) -> Self {
+        Self { outer, material, depth, inner: Medium::OUTSIDE, sibling: Medium::OUTSIDE }
+    }
 }
 
 /// What is on the two sides of a boundary.
@@ -52,8 +60,7 @@ impl Media {
     /// Nothing entered yet.
     #[must_use]
     pub fn new() -> Self {
-        let outside = Nesting { outer: Medium::OUTSIDE, material: u32::MAX, depth: 0 };
-        Self { nestings: vec![outside], entered: HashMap::new() }
+        Self { nestings: vec![Nesting::new(Medium::OUTSIDE, u32::MAX, 0)] }
     }
 
     /// Forgets all nestings if there are many; no [`Medium`] but [`Medium::OUTSIDE`] may be used again.
@@ -118,19 +125,23 @@ impl Media {
     }
 
     fn enter(&mut self, outer: Medium, material: u32) -> Medium {
-        if let Some(&known) = self.entered.get(&(outer, material)) {
-            return known;
+        let around = self.nesting(outer);
+        let mut known = around.inner;
+        while known != Medium::OUTSIDE {
+            let nesting = self.nesting(known);
+            if nesting.material == material {
+                return known;
+            }
+            known = nesting.sibling;
         }
-        let depth = self.nesting(outer).depth + 1;
-        let medium = if depth > DEEPEST {
+        if around.depth == DEEPEST {
             let mut inner = self.solids(outer);
             inner.push(material);
-            inner[1..].iter().fold(Medium::OUTSIDE, |m, &material| self.enter(m, material))
-        } else {
-            self.nestings.push(Nesting { outer, material, depth });
-            Medium((self.nestings.len() - 1) as u32)
-        };
-        self.entered.insert((outer, material), medium);
+            return inner[1..].iter().fold(Medium::OUTSIDE, |m, &material| self.enter(m, material));
+        }
+        let medium = Medium(self.nestings.len() as u32);
+        let sibling = std::mem::replace(&mut self.nestings[outer.0 as usize].inner, medium);
+        self.nestings.push(Nesting { sibling, ..Nesting::new(outer, material, around.depth + 1) });
         medium
     }
 

@@ -1,14 +1,17 @@
 //! From a frozen scene and a backend to a film: tiles, waves of rays, shading.
 
 mod adapt;
+mod aim;
 mod area;
 pub(crate) mod block;
 mod certificate;
 mod contacts;
+mod enclosures;
 mod estimate;
 mod explain;
 pub(crate) mod facets;
 mod job;
+mod known;
 mod lights;
 mod media;
 pub mod optics;
@@ -16,6 +19,7 @@ pub(crate) mod paint;
 mod pixel;
 mod rounds;
 mod shade;
+mod shadows;
 mod shapes;
 mod surface;
 mod surfaces;
@@ -34,9 +38,8 @@ use crate::math::{Sampler, Sampling};
 use crate::scene::{Camera, CameraDesc, Needs, Scene};
 use adapt::Progress;
 use area::Area;
-use certificate::Radiance;
-use contacts::Contacts;
 use estimate::{ErrorSum, Twice};
+use known::Known;
 use pixel::{FirstHits, PixelSum};
 use rounds::Rounds;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -132,8 +135,7 @@ struct Sum {
 struct Common {
     started: Instant,
     tiles: Vec<Crop>,
-    radiance: Radiance,
-    contacts: Contacts,
+    known: Known,
 }
 
 impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
@@ -141,8 +143,7 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
         let common = Common {
             started: Instant::now(),
             tiles: tile::tiles(self.job.crop),
-            radiance: Radiance::of(self.scene, &self.needs, self.job.k_max),
-            contacts: if self.needs.refraction { Contacts::of(self.scene) } else { Contacts::default() },
+            known: Known::of(self.scene, &self.needs, self.job.k_max),
         };
         match self.twice {
             Some(twice) if self.job.is_adaptive() => Rounds::new(self, &common, twice).run(),
@@ -155,7 +156,7 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
         let sum = Mutex::new(self.nothing(common));
         let next = AtomicUsize::new(0);
         rayon::broadcast(|_| {
-            let mut worker = TileWorker::new(self, &common.radiance, &common.contacts);
+            let mut worker = TileWorker::new(self, &common.known);
             let mut area = Area::default();
             while !self.control.is_cancelled() {
                 let index = next.fetch_add(1, Relaxed);
@@ -202,9 +203,12 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
             adapted,
             cut_off_max: in_all(&sum.cut_max),
             cut_off_mean: sum.cut_of_tile.iter().map(in_all).sum::<f64>() / pixels,
-            cut_off_is_estimate: !common.radiance.is_proved() && sum.cut_max[1] > 0.0,
+            cut_off_is_estimate: !common.known.radiance.is_proved() && sum.cut_max[1] > 0.0,
             non_finite_samples: sum.non_finite,
             shadow_rays_facing_away: sum.tally.facing_away,
+            shadow_rays_enclosed: sum.tally.enclosed,
+            shadow_rays_faint: sum.tally.faint,
+            rays_inside: sum.tally.inside,
             branches_below_cut: sum.tally.below_cut,
         };
         Outcome { film: sum.film, stats }
@@ -218,6 +222,9 @@ impl Tally {
         self.rays.reflected += o.rays.reflected;
         self.rays.refracted += o.rays.refracted;
         self.facing_away += o.facing_away;
+        self.enclosed += o.enclosed;
+        self.faint += o.faint;
+        self.inside += o.inside;
         self.below_cut += o.below_cut;
         self.again += o.again;
         self.brightest = self.brightest.max(o.brightest);

@@ -13,7 +13,9 @@ use std::ops::Range;
 pub const TILE: u32 = 32;
 
 /// Camera rays of one wave: what fits in the second-level cache with its answers.
-const SEGMENT: usize = 256;
+pub const SEGMENT: usize = 256;
+/// The same where rays are sent on: the more of them, the more go alike.
+pub const WIDE_SEGMENT: usize = 1024;
 
 /// Where a lone sample goes through its pixel: beside the centre, so that a camera aligned
 /// with a mesh does not send every ray at a vertex or along an edge.
@@ -73,14 +75,15 @@ pub struct Segment<'a> {
     pub sampling: &'a Sampling,
 }
 
-/// Splits samples `range` of all pixels into segments; all samples of a pixel come in order.
+/// Splits samples `range` of all pixels into segments of at most `rays`; all samples of a pixel come in order.
 pub fn segments<'a>(
     pixels: &'a [(u32, u32)],
     range: Range<u32>,
     sampling: &'a Sampling,
+    rays: usize,
 ) -> impl Iterator<Item = Segment<'a>> {
     let samples = (range.end - range.start).min(LANES as u32);
-    let at_once = SEGMENT / samples as usize;
+    let at_once = rays / samples as usize;
     pixels.chunks(at_once).flat_map(move |pixels| {
         range.clone().step_by(samples as usize).map(move |first| Segment {
             pixels,
@@ -202,7 +205,7 @@ mod tests {
             let mut next = vec![0; all.len()];
             let mut at = std::collections::HashMap::new();
             at.extend(all.iter().enumerate().map(|(i, &p)| (p, i)));
-            for s in segments(&all, 0..spp, &sampling) {
+            for s in segments(&all, 0..spp, &sampling, SEGMENT) {
                 assert!((1..=SEGMENT).contains(&(s.pixels.len() * s.samples as usize)));
                 for p in s.pixels {
                     assert_eq!(next[at[p]], s.first, "spp {spp}");

@@ -1,23 +1,26 @@
 //! Waves of rays: a segment of camera rays, their shadow rays, and whatever they send on,
 //! without recursion.
 
+use super::aim::{self, Asked, Rules, Shine};
 use super::block::{Block, F32, Hits, Path};
-use super::certificate::{Bound, Radiance};
-use super::contacts::Contacts;
+use super::certificate::Bound;
+use super::enclosures::Enclosures;
 use super::facets::Facets;
 use super::job::{Job, RayCounts};
-use super::lights::{self, Lit, Target};
+use super::known::Known;
+use super::lights::{self, Lit};
 use super::media::{Media, Medium};
 use super::paint::Palette;
-use super::shade::{self, Branch};
+use super::shade::{Branch, Onwards};
+use super::shadows::{Shadows, take};
 use super::shapes::ShapeHits;
 use super::surface::SurfacePoint;
 use super::tile::Segment;
 use crate::backend::Backend;
 use crate::film::Aov;
 use crate::geom::{Coherence, INVALID_ID, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
-use crate::scene::{Camera, Light, Needs, Object, Scene};
-use glam::{DVec3, Vec3};
+use crate::scene::{Camera, Needs, Object, Scene};
+use glam::DVec3;
 
 /// Most secondary rays worked on at once; the rest waits, newest first, so that memory is
 /// bounded by depth and not by the number of branches.
@@ -32,6 +35,8 @@ const MANY_WAITING: usize = 1 << 19;
 struct Waiting {
     path: Path,
     ray: Ray,
+    /// Object and primitive that the ray is inside of and can only hit, if that is known.
+    inside: Option<[u32; 2]>,
 }
 
 /// What the rays of a segment gather, one entry per sample.
@@ -54,6 +59,12 @@ pub struct Tally {
     pub rays: RayCounts,
     /// Shadow rays that a surface facing away from its light made needless.
     pub facing_away: u64,
+    /// Shadow rays from the inside of a closed shape to a light outside of it.
+    pub enclosed: u64,
+    /// Shadow rays to lights that would have added less than the weight cut.
+    pub faint: u64,
+    /// Rays inside of shapes that touch nothing, which no backend had to be asked about.
+    pub inside: u64,
     /// Branches below the weight cut.
     pub below_cut: u64,
     /// Rays of all kinds that were sent to compare with, and are not counted above.
@@ -69,10 +80,7 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
     scene: &'a Scene,
     backend: &'a B,
     job: &'a Job,
-    radiance: &'a Radiance,
-    contacts: &'a Contacts,
-    /// The lights that can change anything.
-    lights: Vec<Light>,
+    known: &'a Known,
     /// Where highlights are seen from at every depth; `None`: from where each ray came.
     seen_from: Option<DVec3>,
     clip: Option<(f64, f64)>,
@@ -91,12 +99,13 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
     blocks: Vec<Block>,
     /// Blocks in use.
     used: usize,
-    shadows: PacketBatch<RayPacket>,
-    /// The block of each shadow packet.
-    shadowed: Vec<u32>,
+    shadows: Shadows<SECONDARY>,
+    /// What the light at hand would add to each block.
+    shines: Vec<Shine>,
     /// Unoccluded share of a light with a size, for each block.
     visible: Vec<F32>,
     media: Media,
+    onwards: Onwards,
     waiting: Vec<Waiting>,
     /// What the current segment gathers.
     pub gathered: Gathered,
@@ -112,25 +121,20 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         backend: &'a B,
         job: &'a Job,
         needs: &Needs,
-        radiance: &'a Radiance,
-        contacts: &'a Contacts,
+        known: &'a Known,
     ) -> Self {
         let cost = job.aovs.contains(&Aov::Cost).then(Vec::new);
         let seen = job.aovs.iter().any(|&a| !matches!(a, Aov::Cost | Aov::Samples)).then(Vec::new);
-        let lights = scene.lights.iter().filter(|l| needs.shadow_rays && l.color != Vec3::ZERO);
         let is_shapes: Vec<bool> = scene.objects.iter().map(|o| matches!(o, Object::Shapes(_))).collect();
         Self {
             scene,
             backend,
             job,
-            radiance,
-            contacts,
-            lights: lights.copied().collect(),
+            known,
             seen_from: scene.course_rules.then_some(camera.eye),
             clip: camera.clip,
             palette: Palette::of(scene),
             branching: scene.materials.iter().map(|m| m.reflects() || m.refracts()).collect(),
-
             absorbs: needs.absorption,
             facets: is_shapes.contains(&false).then(|| Box::new(Facets::new(scene))),
             shape_hits: is_shapes.contains(&true).then(Box::default),
@@ -138,10 +142,11 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             is_shapes,
             blocks: Vec::new(),
             used: 0,
-            shadows: PacketBatch::default(),
-            shadowed: Vec::new(),
+            shadows: Shadows::new(),
+            shines: Vec::new(),
             visible: Vec::new(),
             media: Media::new(),
+            onwards: Onwards::default(),
             waiting: Vec::new(),
             gathered: Gathered { cost, seen, ..Gathered::default() },
             tally: Tally::default(),
@@ -183,17 +188,25 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
 
     fn secondary_waves(&mut self, segment: &Segment<'_>) {
         let mut batch = PacketBatch::<RayHitPacket>::default();
-        let mut paths = Vec::new();
+        let (mut paths, mut answered) = (Vec::new(), Vec::new());
         while !self.waiting.is_empty() {
             let at_once = if self.waiting.len() < MANY_WAITING { MOST_AT_ONCE } else { LANES };
             let newest = self.waiting.len().saturating_sub(at_once);
             batch.clear();
             paths.clear();
+            answered.clear();
             for w in self.waiting.drain(newest..) {
-                batch.push(&w.ray);
+                let exit = w.inside.and_then(|id| Some((batch.len(), id, Enclosures::exit(self.scene, id, &w.ray)?)));
+                // A ray that ends before it starts asks the backend nothing.
+                batch.push(&exit.map_or(w.ray, |_| Ray { t_far: f32::NEG_INFINITY, ..w.ray }));
                 paths.push(w.path);
+                answered.extend(exit);
             }
             self.backend.intersect_many(&mut batch, Coherence::Incoherent);
+            self.tally.inside += answered.len() as u64;
+            for &(ray, id, t) in &answered {
+                batch.answer(ray, id, t);
+            }
             self.collect(&batch, |i| paths[i]);
             self.shade(segment);
         }
@@ -295,14 +308,14 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     }
 
     fn shade(&mut self, segment: &Segment<'_>) {
-        for index in 0..self.lights.len() {
-            if self.lights[index].radius > 0.0 {
+        for index in 0..self.known.lights.len() {
+            if self.known.lights[index].radius > 0.0 {
                 self.soft_light(index, segment);
             } else {
                 self.light(index);
             }
         }
-        if SECONDARY && !self.radiance.is_proved() {
+        if SECONDARY && !self.known.radiance.is_proved() {
             self.note_brightest();
         }
         for block in &self.blocks[..self.used] {
@@ -327,34 +340,60 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
 
     /// Adds one light to all blocks: its shadow rays go out as one batch.
     fn light(&mut self, index: usize) {
-        let light = self.lights[index];
-        self.send_shadow_rays(|_, block, packet| lights::aim(block, &light, Target::Center, packet));
-        for (packet, &i) in self.shadows.packets().iter().zip(&self.shadowed) {
-            let to_light = [packet.d_x, packet.d_y, packet.d_z];
-            let visible = lights::unoccluded(packet);
-            let lit = Lit { visible: &visible, to_light: &to_light, seen_from: self.seen_from };
-            lights::add(&mut self.blocks[i as usize], &light, lit);
+        let (light, rules) = (self.known.lights[index], self.rules(index));
+        self.shadows.start(self.used);
+        self.shines.resize(self.used.max(self.shines.len()), Shine::NONE);
+        for i in 0..self.used {
+            let (block, shine) = (&self.blocks[i], &mut self.shines[i]);
+            let asked = self.shadows.push(i, |packet| {
+                let asked = aim::at_center(block, &light, self.seen_from, rules, packet, shine);
+                (asked, asked.sent)
+            });
+            self.note(i, asked, 1);
+            self.sent(i, asked.sent);
+        }
+        self.shadows.trace(self.backend);
+        let lit = self.shines.iter().zip(self.shadows.visible());
+        for (block, (shine, visible)) in self.blocks.iter_mut().zip(lit) {
+            take(block, shine, visible);
         }
     }
 
     /// Adds one light that has a size: a batch for each of its samples, and the share of them
     /// that got through.
     fn soft_light(&mut self, index: usize, segment: &Segment<'_>) {
-        let (light, rounds) = (self.lights[index], self.job.light_samples.max(1));
+        let (light, rules) = (self.known.lights[index], self.rules(index));
+        let rounds = self.job.light_samples.max(1);
+        let mut to_center = RayPacket::EMPTY;
+        let mut wanted = Vec::with_capacity(self.used);
+        self.shines.resize(self.used.max(self.shines.len()), Shine::NONE);
+        for i in 0..self.used {
+            let (block, shine) = (&self.blocks[i], &mut self.shines[i]);
+            let asked = aim::at_center(block, &light, self.seen_from, rules, &mut to_center, shine);
+            self.note(i, asked, u64::from(rounds));
+            wanted.push(asked.sent);
+        }
         self.visible.clear();
         self.visible.resize(self.used, [0.0; LANES]);
         for round in 0..rounds {
-            self.send_shadow_rays(|_, block, packet| {
+            self.shadows.start(self.used);
+            for (i, &wanted) in wanted.iter().enumerate().filter(|(_, wanted)| **wanted != 0) {
+                let block = &self.blocks[i];
                 let points = lights::points_on(block, &light, |lane| {
                     let (samples, sample) = segment.samples_of(block.slot[lane]);
                     let number = sample.wrapping_mul(rounds).wrapping_add(round);
                     samples.on_light(number, index as u32, block.branch[lane])
                 });
-                lights::aim(block, &light, Target::Points(&points), packet)
-            });
-            for (packet, &i) in self.shadows.packets().iter().zip(&self.shadowed) {
-                for (sum, through) in self.visible[i as usize].iter_mut().zip(lights::unoccluded(packet)) {
-                    *sum += through;
+                let sent = self.shadows.push(i, |packet| {
+                    let sent = aim::at_points(block, &points, wanted, packet);
+                    (sent, sent)
+                });
+                self.sent(i, sent);
+            }
+            self.shadows.trace(self.backend);
+            for (sum, through) in self.visible.iter_mut().zip(self.shadows.visible()) {
+                for lane in 0..LANES {
+                    sum[lane] += through[lane];
                 }
             }
         }
@@ -369,81 +408,83 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         }
     }
 
-    /// Sends the shadow rays that `aim` makes for each block; `shadows` then holds the answers,
-    /// `shadowed` the blocks they are for.
-    fn send_shadow_rays(&mut self, aim: impl Fn(usize, &Block, &mut RayPacket) -> (u32, u32)) {
-        self.shadows.clear();
-        self.shadowed.clear();
-        for (i, block) in self.blocks[..self.used].iter().enumerate() {
-            let packet = self.shadows.push_packet();
-            let (sent, facing_away) = aim(i, block, packet);
-            self.tally.facing_away += u64::from(facing_away);
-            self.tally.rays.shadow += u64::from(sent);
-            if sent == 0 {
-                self.shadows.pop_packet();
-                continue;
-            }
-            self.shadowed.push(i as u32);
-            if let Some(cost) = &mut self.gathered.cost {
-                let lanes = (0..block.len).filter(|&lane| packet.t_far[lane] > 0.0);
-                lanes.for_each(|lane| cost[block.slot[lane] as usize] += 1);
-            }
+    fn rules(&self, light: usize) -> Rules {
+        let faint = if SECONDARY { self.job.min_weight } else { 0.0 };
+        Rules { faint, outside: self.known.enclosures.is_outside(light) }
+    }
+
+    /// Counts the shadow rays that block `index` did not need, in each of `rounds`, and bounds what was left out.
+    fn note(&mut self, index: usize, asked: Asked, rounds: u64) {
+        let count = |lanes: u32| rounds * u64::from(lanes.count_ones());
+        self.tally.facing_away += count(asked.facing_away);
+        self.tally.enclosed += count(asked.enclosed);
+        self.tally.faint += count(asked.faint);
+        let (block, shine) = (&self.blocks[index], &self.shines[index]);
+        for lane in lanes(asked.faint) {
+            let most = Block::vec3(&block.weight, lane) * Block::vec3(&shine.add, lane);
+            self.gathered.cut[block.slot[lane] as usize][0] += f64::from(most.max_element());
         }
-        self.backend.occluded_many(&mut self.shadows, Coherence::Coherent);
+    }
+
+    /// Counts shadow rays of block `index`.
+    fn sent(&mut self, index: usize, sent: u32) {
+        self.tally.rays.shadow += u64::from(sent.count_ones());
+        if let Some(cost) = &mut self.gathered.cost {
+            lanes(sent).for_each(|lane| cost[self.blocks[index].slot[lane] as usize] += 1);
+        }
     }
 
     /// Sends on the mirrored and refracted branches of all blocks.
     fn branch(&mut self) {
         let blocks = std::mem::take(&mut self.blocks);
         for block in &blocks[..self.used] {
-            for lane in 0..block.len {
-                if self.branching[block.material[lane] as usize] {
-                    self.branch_lane(block, lane);
-                }
+            let branches = |lane: &usize| self.branching[block.material[*lane] as usize];
+            let lanes: u32 = (0..block.len).filter(branches).map(|lane| 1 << lane).sum();
+            if lanes != 0 {
+                self.branch_block(block, lanes);
             }
         }
         self.blocks = blocks;
     }
 
-    fn branch_lane(&mut self, block: &Block, lane: usize) {
-        let path = block.path(lane);
-        let index = block.material[lane];
-        let material = &self.scene.materials[index as usize];
-        if path.depth >= self.job.k_max {
-            let most = path.weight.max_element() * material.passed_on();
-            self.gathered.leave_out(path.slot, most, self.radiance.beyond());
-            return;
-        }
-        let point = SurfacePoint::of_lane(block, lane);
-        let d = -point.to_eye.as_dvec3().normalize();
-        let sent = shade::onward(self.scene, self.contacts, &mut self.media, &point, path.medium, d);
-        if let Some(branch) = sent.reflected.and_then(|b| self.worth_sending(&path, &b)) {
-            self.tally.rays.reflected += 1;
-            self.send(branch, &path, &point, 0, path.medium);
-        }
-        if let Some(branch) = sent.refracted.and_then(|b| self.worth_sending(&path, &b)) {
-            self.tally.rays.refracted += 1;
-            self.send(branch, &path, &point, 1, sent.behind);
+    fn branch_block(&mut self, block: &Block, branching: u32) {
+        self.onwards.find(self.scene, &self.known.contacts, &mut self.media, block, branching);
+        for lane in lanes(branching) {
+            let path = block.path(lane);
+            if path.depth >= self.job.k_max {
+                let most = path.weight.max_element() * self.scene.materials[block.material[lane] as usize].passed_on();
+                self.gathered.leave_out(path.slot, most, self.known.radiance.beyond());
+                continue;
+            }
+            let sent = self.onwards.lane(self.scene, block, lane);
+            if let Some(branch) = sent.reflected.and_then(|b| self.worth_sending(&path, b)) {
+                self.tally.rays.reflected += 1;
+                self.send(branch, &path, block.id[lane], 0, path.medium);
+            }
+            if let Some(branch) = sent.refracted.and_then(|b| self.worth_sending(&path, b)) {
+                self.tally.rays.refracted += 1;
+                self.send(branch, &path, block.id[lane], 1, sent.behind);
+            }
         }
     }
 
     /// The branch with its weight in the sample, or `None`, accounted for, if it is cut.
-    fn worth_sending(&mut self, path: &Path, branch: &Branch) -> Option<Branch> {
+    fn worth_sending(&mut self, path: &Path, branch: Branch) -> Option<Branch> {
         let weight = path.weight * branch.weight;
         let most = weight.max_element();
         if most >= self.job.min_weight && most > 0.0 {
-            return Some(Branch { weight, ..*branch });
+            return Some(Branch { weight, ..branch });
         }
         self.tally.below_cut += 1;
-        self.gathered.leave_out(path.slot, most, self.radiance.within(self.job.k_max - path.depth - 1));
+        self.gathered.leave_out(path.slot, most, self.known.radiance.within(self.job.k_max - path.depth - 1));
         None
     }
 
-    fn send(&mut self, branch: Branch, path: &Path, point: &SurfacePoint, kind: u32, medium: Medium) {
+    fn send(&mut self, branch: Branch, path: &Path, from: [u32; 2], kind: u32, medium: Medium) {
         if let Some(cost) = &mut self.gathered.cost {
             cost[path.slot as usize] += 1;
         }
-        let ray = Ray::new(point.origin_towards(branch.d), branch.d.as_vec3());
+        let ray = Ray::new(branch.o, branch.d);
         let path = Path {
             slot: path.slot,
             depth: path.depth + 1,
@@ -451,7 +492,8 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             branch: path.branch.bounced(kind),
             medium,
         };
-        self.waiting.push(Waiting { path, ray });
+        let inside = (branch.inwards && self.known.enclosures.is_solitary(from)).then_some(from);
+        self.waiting.push(Waiting { path, ray, inside });
     }
 }
 
@@ -462,6 +504,15 @@ impl Gathered {
         cut[0] += f64::from(most) * f64::from(bound.fixed);
         cut[1] += f64::from(most) * f64::from(bound.scaled);
     }
+}
+
+/// The lanes whose bits are set.
+fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = bits.trailing_zeros();
+        bits &= bits.wrapping_sub(1);
+        (lane < u32::BITS).then_some(lane as usize)
+    })
 }
 
 /// Whether all lanes of a packet hold a hit; those without a ray may hold an old one.

@@ -1,9 +1,8 @@
 //! One thread's part of a render: samples of pixels, by segments.
 
 use super::Render;
-use super::certificate::Radiance;
-use super::contacts::Contacts;
 use super::estimate::Twice;
+use super::known::Known;
 use super::pixel::{FirstHits, PixelSum};
 use super::tile::{self, Segment};
 use super::wave::{Tally, Waves};
@@ -70,9 +69,8 @@ pub struct TileWorker<'a, B, const SECONDARY: bool> {
 
 impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
     /// Empty buffers.
-    pub fn new(render: &'a Render<'a, B, SECONDARY>, radiance: &'a Radiance, contacts: &'a Contacts) -> Self {
-        let waves =
-            Waves::new(render.scene, &render.camera, render.backend, render.job, &render.needs, radiance, contacts);
+    pub fn new(render: &'a Render<'a, B, SECONDARY>, known: &'a Known) -> Self {
+        let waves = Waves::new(render.scene, &render.camera, render.backend, render.job, &render.needs, known);
         Self { render, waves, batch: PacketBatch::default() }
     }
 
@@ -92,10 +90,11 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
 
     fn trace(&mut self, pixels: &mut Pixels, samples: Range<u32>, sampling: &Sampling) -> bool {
         let control = self.render.control;
+        let rays = if SECONDARY { tile::WIDE_SEGMENT } else { tile::SEGMENT };
         let mut first_pixel = 0;
         let last = samples.end;
         let Pixels { at, sums, hits } = pixels;
-        for segment in tile::segments(at, samples, sampling) {
+        for segment in tile::segments(at, samples, sampling, rays) {
             // A tile of many samples takes long.
             if control.is_cancelled() {
                 return false;

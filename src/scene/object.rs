@@ -230,4 +230,14 @@ impl AnyShapes {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+
+    /// Whether all of them are convex and enclose a space.
+    #[must_use]
+    pub fn are_closed(&self) -> bool {
+        match self {
+            Self::Spheres(_) | Self::PlacedSpheres(_) | Self::Cubes(_) | Self::PlacedCubes(_) => true,
+            // Open ones are among them.
+            Self::Cylinders(_) | Self::Quads(_) | Self::Triangles(_) => false,
+        }
+    }
 }

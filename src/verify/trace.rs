@@ -220,7 +220,8 @@ fn bounced(group: Group, point: &SurfacePoint, random: &mut Random) -> Option<Ra
         Group::Mirrored => optics::reflect(d, point.ns),
         Group::Refracted => {
             let eta = if point.entering { 1.0 / INDEX } else { INDEX };
-            optics::refract(d, point.ns, eta)?.direction
+            let bent = optics::refract::<false>(d, point.ns, eta);
+            bent.passes.then_some(bent.direction)?
         }
         _ => {
             let disc = concentric_disc(random.unit(), random.unit());
