@@ -61,9 +61,6 @@ impl Filter {
     #[inline]
     #[must_use]
     pub fn offset(self, u: f64) -> f64 {
-        static BLACKMAN_HARRIS: LazyLock<Inverse> = LazyLock::new(|| Inverse::new(blackman_harris_within, &[0.0, 1.5]));
-        static MITCHELL: LazyLock<Inverse> =
-            LazyLock::new(|| Inverse::new(mitchell_within, &[0.0, MITCHELL_ZERO, 2.0]));
         let signed = 2.0 * u - 1.0;
         let away = match self {
             Self::Box => return 0.5 * signed,
@@ -72,6 +69,27 @@ impl Filter {
             Self::Mitchell => MITCHELL.at(signed.abs()),
         };
         away.copysign(signed)
+    }
+
+    /// [`offset`](Self::offset) for many numbers at once: the same bits. Plain loops, to be inlined into code for wide
+    /// vectors.
+    #[inline(always)]
+    #[must_use]
+    pub fn offsets<const N: usize>(self, u: &[f64; N]) -> [f64; N] {
+        let mut signed = [0.0; N];
+        for i in 0..N {
+            signed[i] = 2.0 * u[i] - 1.0;
+        }
+        let away = match self {
+            Self::Box | Self::Tent => return u.map(|u| self.offset(u)),
+            Self::BlackmanHarris => BLACKMAN_HARRIS.at_each(&signed.map(f64::abs)),
+            Self::Mitchell => MITCHELL.at_each(&signed.map(f64::abs)),
+        };
+        let mut offsets = [0.0; N];
+        for i in 0..N {
+            offsets[i] = away[i].copysign(signed[i]);
+        }
+        offsets
     }
 
     /// Whether [`weight`](Self::weight) is not always 1.
@@ -91,6 +109,9 @@ impl Filter {
         if negative(across) == negative(down) { MITCHELL_WEIGHT } else { -MITCHELL_WEIGHT }
     }
 }
+
+static BLACKMAN_HARRIS: LazyLock<Inverse> = LazyLock::new(|| Inverse::new(blackman_harris_within, &[0.0, 1.5]));
+static MITCHELL: LazyLock<Inverse> = LazyLock::new(|| Inverse::new(mitchell_within, &[0.0, MITCHELL_ZERO, 2.0]));
 
 /// Share of the filter within `x` of the centre, `x` from 0 to 1.5.
 fn blackman_harris_within(x: f64) -> f64 {
@@ -127,15 +148,20 @@ fn mitchell_within(x: f64) -> f64 {
 /// The inverse of a rising function on `[0, 1]`, as straight pieces.
 #[derive(Debug)]
 struct Inverse {
-    /// Ends of the pieces: value of the function, argument.
-    nodes: Vec<[f64; 2]>,
+    /// Ends of the pieces: values of the function, arguments. The last one fills what is left.
+    values: [f64; NODES],
+    arguments: [f64; NODES],
     /// The last node whose value is not above each of so many equal steps from 0 to 1.
-    guide: Vec<u16>,
+    guide: [u32; GUIDES],
+    /// Start of the last piece.
+    last: u32,
 }
 
 /// Largest error of a straight piece where it is looked at, its middle.
 const TOLERANCE: f64 = 2e-5;
-/// Steps from 0 to 1: more than there are nodes, of which there are some hundred.
+/// Room for nodes, of which there are some hundred.
+const NODES: usize = 512;
+/// Steps from 0 to 1: more than there are nodes.
 const GUIDES: usize = 1024;
 
 impl Inverse {
@@ -145,9 +171,15 @@ impl Inverse {
         for pair in ends.windows(2) {
             Self::refine(share, [pair[0], pair[1]], &mut nodes);
         }
+        assert!(nodes.len() <= NODES, "the filters are known, and so is the number of their nodes");
         let step = |k: usize| k as f64 / GUIDES as f64;
-        let guide = (0..GUIDES).map(|k| nodes.partition_point(|n| n[0] <= step(k)) as u16 - 1).collect();
-        Self { nodes, guide }
+        let at = |i: usize| nodes[i.min(nodes.len() - 1)];
+        Self {
+            values: std::array::from_fn(|i| at(i)[0]),
+            arguments: std::array::from_fn(|i| at(i)[1]),
+            guide: std::array::from_fn(|k| nodes.partition_point(|n| n[0] <= step(k)) as u32 - 1),
+            last: nodes.len() as u32 - 2,
+        }
     }
 
     /// Adds the pieces from `from` to `to` and their ends.
@@ -166,13 +198,56 @@ impl Inverse {
     /// The argument that has this value, which is from 0 to 1.
     #[inline]
     fn at(&self, value: f64) -> f64 {
-        let mut piece = usize::from(self.guide[((value * GUIDES as f64) as usize).min(GUIDES - 1)]);
-        // Most steps hold no node, or one.
-        while piece + 2 < self.nodes.len() && self.nodes[piece + 1][0] <= value {
+        let mut piece = self.first(value);
+        while self.goes_on(piece, value) {
             piece += 1;
         }
-        let ([low, from], [high, to]) = (self.nodes[piece], self.nodes[piece + 1]);
-        from + (to - from) * ((value - low) / (high - low)).min(1.0)
+        self.within(piece, value)
+    }
+
+    /// [`at`](Self::at) for many.
+    #[inline(always)]
+    fn at_each<const N: usize>(&self, values: &[f64; N]) -> [f64; N] {
+        let mut pieces = [0u32; N];
+        let mut more = false;
+        for i in 0..N {
+            let first = self.first(values[i]);
+            // Most steps hold no node, or one.
+            let piece = first + u32::from(self.goes_on(first, values[i]));
+            more |= self.goes_on(piece, values[i]);
+            pieces[i] = piece;
+        }
+        while more {
+            more = false;
+            for i in 0..N {
+                pieces[i] += u32::from(self.goes_on(pieces[i], values[i]));
+                more |= self.goes_on(pieces[i], values[i]);
+            }
+        }
+        let mut arguments = [0.0; N];
+        for i in 0..N {
+            arguments[i] = self.within(pieces[i], values[i]);
+        }
+        arguments
+    }
+
+    #[inline(always)]
+    fn first(&self, value: f64) -> u32 {
+        self.guide[((value * GUIDES as f64) as u32 as usize).min(GUIDES - 1)]
+    }
+
+    /// Whether the value is beyond the piece.
+    #[inline(always)]
+    fn goes_on(&self, piece: u32, value: f64) -> bool {
+        (piece < self.last) & (self.values[(piece as usize + 1) % NODES] <= value)
+    }
+
+    #[inline(always)]
+    fn within(&self, piece: u32, value: f64) -> f64 {
+        let (from, to) = (piece as usize % NODES, (piece as usize + 1) % NODES);
+        let (low, high) = (self.values[from], self.values[to]);
+        let (start, end) = (self.arguments[from], self.arguments[to]);
+        start + (end - start) * ((value - low) / (high - low)).min(1.0)
     }
 }
 

@@ -1,8 +1,10 @@
 //! Sample points: where in the pixel, on the lens and on a light.
 
+mod lanes;
 mod strata;
 
 use glam::DVec2;
+pub use lanes::SobolLanes;
 use strata::Strata;
 
 /// Points of one index block of the Sobol sequence; beyond it a new scramble begins.
@@ -192,6 +194,7 @@ impl Branch {
 }
 
 /// A bijective 32-bit hash ("lowbias32" of C. Wellons' hash prospector).
+#[inline(always)]
 #[must_use]
 pub fn hash(mut x: u32) -> u32 {
     x ^= x >> 16;

@@ -26,12 +26,19 @@ impl Shine {
 }
 
 /// When a shadow ray may be left out.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Rules {
     /// After a bounce, a light is left out where it would add less than this to the sample. 0 leaves none out.
     pub faint: f32,
     /// Whether the light stands outside of every closed shape, so that from the inside of one it is hidden.
     pub outside: bool,
+}
+
+impl Rules {
+    /// Share of the weight cut below which a light is faint. What branches bring mostly makes up for a good part of
+    /// what the cut allows, a light is known to add all of it: at 1/16 a light left out at the default cut is less than a
+    /// fifth of a step of an 8-bit image in the dark.
+    pub const FAINT_SHARE: f32 = 1.0 / 16.0;
 }
 
 /// Lanes of a block, one bit each.

@@ -157,7 +157,8 @@ impl<B: Backend> Teller<'_, B> {
     /// Tells about one light and returns what it adds.
     fn light(&self, index: usize, block: &mut Block, indent: &str, told: &mut Told<'_>) -> Vec3 {
         let light = &told.known.lights[index];
-        let rules = Rules { faint: self.job.min_weight, outside: told.known.enclosures.is_outside(index) };
+        let faint = Rules::FAINT_SHARE * self.job.min_weight;
+        let rules = Rules { faint, outside: told.known.enclosures.is_outside(index) };
         let (mut batch, mut shine) = (PacketBatch::<RayPacket>::default(), Shine::NONE);
         let asked = aim::at_center(block, light, told.seen_from, rules, batch.push_packet(), &mut shine);
         let rounds = if light.radius > 0.0 { self.job.light_samples.max(1) } else { 1 };

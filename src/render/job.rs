@@ -91,6 +91,16 @@ impl Job {
         }
     }
 
+    /// [`offset`](Self::offset) for many numbers, to be inlined into code for wide vectors.
+    #[inline(always)]
+    #[must_use]
+    pub fn offsets<const N: usize>(&self, u: &[f64; N]) -> [f64; N] {
+        match self.filter {
+            Filter::Box => u.map(|u| self.offset(u)),
+            filter => filter.offsets(u),
+        }
+    }
+
     /// Whether some samples count negative.
     #[must_use]
     pub fn has_negative_samples(&self) -> bool {

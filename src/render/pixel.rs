@@ -2,7 +2,7 @@
 
 use super::surface::SurfacePoint;
 use crate::film::{Aov, AovImage};
-use crate::geom::RayHitPacket;
+use crate::geom::{LANES, RayHitPacket};
 use glam::{DVec3, Vec3};
 
 /// The sums of one pixel's samples.
@@ -46,16 +46,19 @@ impl PixelSum {
         if self.counted < 2 { 0.0 } else { self.deviation / (3.0 * n * (n - 1.0)) }
     }
 
-    /// Adds samples in their order.
+    /// Adds samples, at most a packet's worth, in their order.
     pub fn add(&mut self, samples: &[DVec3], deviations: bool) {
         self.taken += samples.len() as u32;
         let before = *self;
+        let (mut colors, mut count) = ([DVec3::ZERO; LANES], 0);
         for color in samples.iter().filter_map(|s| kept(*s)) {
             self.color += color;
-            self.counted += 1;
+            colors[count] = color;
+            count += 1;
         }
+        self.counted += count as u32;
         if deviations {
-            self.deviate(&before, samples.iter().filter_map(|s| kept(*s)));
+            self.deviate(&before, colors[..count].iter().copied());
         }
     }
 

@@ -2,10 +2,10 @@
 
 use super::job::{Crop, Job};
 use crate::geom::{LANES, PacketBatch, RayHitPacket};
-use crate::math::{PixelSamples, Sampling, concentric_disc, polar_disc, rejection_disc, uniform_radius_disc};
+use crate::math::{PixelSamples, Sampling, SobolLanes, concentric_disc, polar_disc, rejection_disc, uniform_radius_disc};
 use crate::scene::desc::LensSampler;
 use crate::scene::{Camera, CameraRays};
-use crate::simd;
+use crate::simd::{self, Kernel};
 use glam::DVec2;
 use std::ops::Range;
 
@@ -114,33 +114,117 @@ impl<'a> Segment<'a> {
     /// Fills `batch` with the camera rays.
     pub fn camera_rays(&self, camera: &Camera, job: &Job, batch: &mut PacketBatch<RayHitPacket>) {
         batch.resize(self.pixels.len() * self.samples as usize);
-        let samples = self.first..self.first + self.samples;
-        let mut points = self.pixels.iter().flat_map(|&pixel| samples.clone().map(move |sample| (pixel, sample)));
-        let (mut at, mut lens) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
+        let end = self.first + self.samples;
+        let mut rays = self.pixels.iter().flat_map(|&pixel| (self.first..end).map(move |sample| (pixel, sample)));
+        let draw = Draw::of(self, camera, job);
+        let (mut asked, mut at, mut lens) = (Asked::default(), [[0.0; LANES]; 2], [[0.0; LANES]; 2]);
         for (packet, live) in batch.packets_mut() {
-            for (lane, (pixel, sample)) in points.by_ref().take(live).enumerate() {
-                let (x, y, disc) = image_point(camera, job, self.sampling, pixel, sample);
-                (at[0][lane], at[1][lane]) = (x, y);
-                (lens[0][lane], lens[1][lane]) = (disc.x, disc.y);
+            for (lane, ((x, y), sample)) in rays.by_ref().take(live).enumerate() {
+                (asked.x[lane], asked.y[lane], asked.sample[lane]) = (x, y, sample);
+            }
+            let points = draw.points(self.sampling, &asked, live);
+            match &points {
+                Some([a, b, ..]) if job.spp > 1 => simd::run(Jittered { job, of: [a, b], asked: &asked, at: &mut at }),
+                _ => {
+                    let (dx, dy) = if job.centre { CENTRE } else { BESIDE_CENTRE };
+                    at = [asked.x.map(|x| f64::from(x) + dx), asked.y.map(|y| f64::from(y) + dy)];
+                }
+            }
+            if let (Some([_, _, u, v]), Some(_)) = (&points, &camera.lens) {
+                for lane in 0..live {
+                    let samples = self.sampling.pixel(asked.x[lane], asked.y[lane]);
+                    let disc = on_lens(job.lens_sampler, samples, asked.sample[lane], [u[lane], v[lane]]);
+                    (lens[0][lane], lens[1][lane]) = (disc.x, disc.y);
+                }
             }
             simd::run(CameraRays { camera, at: &at, lens: &lens, packet: &mut packet.ray });
         }
     }
 }
 
-/// Where sample `sample` of `pixel` goes through the image, in pixels, and through the unit lens.
-#[inline]
-fn image_point(camera: &Camera, job: &Job, sampling: &Sampling, pixel: (u32, u32), sample: u32) -> (f64, f64, DVec2) {
-    let (x, y) = (f64::from(pixel.0), f64::from(pixel.1));
-    let lone = if job.centre { CENTRE } else { BESIDE_CENTRE };
-    if job.spp == 1 && camera.lens.is_none() {
-        return (x + lone.0, y + lone.1, DVec2::ZERO);
+/// How the sample points of a segment's camera rays are drawn.
+enum Draw {
+    /// Not at all.
+    None,
+    /// Those of the pixel only.
+    Pixel(SobolLanes<2>),
+    /// Those of the lens too.
+    All(SobolLanes<4>),
+    OneByOne,
+}
+
+impl Draw {
+    fn of(segment: &Segment<'_>, camera: &Camera, job: &Job) -> Self {
+        let end = segment.first + segment.samples;
+        let found = match (job.spp, camera.lens) {
+            (1, None) => return Self::None,
+            (_, None) => segment.sampling.lanes(end).map(Self::Pixel),
+            _ => segment.sampling.lanes(end).map(Self::All),
+        };
+        found.unwrap_or(Self::OneByOne)
     }
-    let samples = sampling.pixel(pixel.0, pixel.1);
-    let [a, b, u, v] = samples.point(sample);
-    let (dx, dy) = if job.spp == 1 { lone } else { (0.5 + job.offset(a), 0.5 + job.offset(b)) };
-    let disc = if camera.lens.is_some() { on_lens(job.lens_sampler, samples, sample, [u, v]) } else { DVec2::ZERO };
-    (x + dx, y + dy, disc)
+
+    fn points(&self, sampling: &Sampling, asked: &Asked, live: usize) -> Option<[[f64; LANES]; 4]> {
+        match *self {
+            Self::None => None,
+            Self::Pixel(of) => {
+                let [a, b] = simd::run(Points { of, asked });
+                Some([a, b, [0.0; LANES], [0.0; LANES]])
+            }
+            Self::All(of) => Some(simd::run(Points { of, asked })),
+            Self::OneByOne => {
+                let mut points = [[0.0; LANES]; 4];
+                for lane in 0..live {
+                    let point = sampling.pixel(asked.x[lane], asked.y[lane]).point(asked.sample[lane]);
+                    points.iter_mut().zip(point).for_each(|(to, x)| to[lane] = x);
+                }
+                Some(points)
+            }
+        }
+    }
+}
+
+/// The rays of a packet: pixel and sample.
+#[derive(Debug, Default)]
+struct Asked {
+    x: [u32; LANES],
+    y: [u32; LANES],
+    sample: [u32; LANES],
+}
+
+struct Points<'a, const DIMENSIONS: usize> {
+    of: SobolLanes<DIMENSIONS>,
+    asked: &'a Asked,
+}
+
+impl<const DIMENSIONS: usize> Kernel for Points<'_, DIMENSIONS> {
+    type Output = [[f64; LANES]; DIMENSIONS];
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        self.of.points([&self.asked.x, &self.asked.y], &self.asked.sample)
+    }
+}
+
+/// Image points around the middles of their pixels.
+struct Jittered<'a> {
+    job: &'a Job,
+    of: [&'a [f64; LANES]; 2],
+    asked: &'a Asked,
+    at: &'a mut [[f64; LANES]; 2],
+}
+
+impl Kernel for Jittered<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let [dx, dy] = [self.job.offsets(self.of[0]), self.job.offsets(self.of[1])];
+        for lane in 0..LANES {
+            self.at[0][lane] = f64::from(self.asked.x[lane]) + (0.5 + dx[lane]);
+            self.at[1][lane] = f64::from(self.asked.y[lane]) + (0.5 + dy[lane]);
+        }
+    }
 }
 
 /// A point of the unit disc by the sampler that was asked for.

@@ -409,7 +409,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     }
 
     fn rules(&self, light: usize) -> Rules {
-        let faint = if SECONDARY { self.job.min_weight } else { 0.0 };
+        let faint = if SECONDARY { Rules::FAINT_SHARE * self.job.min_weight } else { 0.0 };
         Rules { faint, outside: self.known.enclosures.is_outside(light) }
     }
 

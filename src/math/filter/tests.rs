@@ -129,3 +129,15 @@ fn a_negative_sample_is_one_of_sixteen_and_the_noise_is_as_told() {
 fn names_differ() {
     assert_eq!(Filter::ALL.map(Filter::name), ["box", "tent", "blackman-harris", "mitchell"]);
 }
+
+#[test]
+fn many_at_once_are_what_each_is() {
+    for filter in Filter::ALL {
+        for k in 0..4000 {
+            let u: [f64; 8] = std::array::from_fn(|i| (f64::from(k) + i as f64 / 8.0) / 4000.0);
+            assert_eq!(filter.offsets(&u), u.map(|u| filter.offset(u)), "{}", filter.name());
+        }
+        let ends = [0.0, f64::EPSILON, 0.5, 1.0 - 1e-7, 1.0 - f64::EPSILON];
+        assert_eq!(filter.offsets(&ends), ends.map(|u| filter.offset(u)), "{}", filter.name());
+    }
+}
