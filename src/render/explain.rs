@@ -181,9 +181,11 @@ impl<B: Backend> Teller<'_, B> {
         }
         block.color = [[0.0; LANES]; 3];
         let to_light = lights::to_center(block, light);
-        lights::add(block, light, Lit { visible: &[visible; LANES], to_light: &to_light, seen_from: told.seen_from });
+        let (visible, shines) = (&[visible; LANES], lights::shines(block));
+        lights::add(block, light, Lit { visible, to_light: &to_light, seen_from: told.seen_from }, shines);
         let lit = Block::vec3(&block.weight, 0) * Block::vec3(&block.color, 0);
-        let part = if visible < 1.0 { format!(" ({:.0} % of it visible)", 100.0 * visible) } else { String::new() };
+        let part =
+            if visible[0] < 1.0 { format!(" ({:.0} % of it visible)", 100.0 * visible[0]) } else { String::new() };
         told.out += &format!("{indent}  light {index}: {}{part}\n", rgb(lit));
         lit
     }

@@ -10,7 +10,7 @@ use crate::simd::{self, Kernel};
 use glam::DVec3;
 
 /// End of a shadow ray that was sent at a light: just short of it.
-const BEFORE_THE_LIGHT: f32 = 1.0 - 4.0 * 0.5 * f32::EPSILON;
+pub const BEFORE_THE_LIGHT: f32 = 1.0 - 4.0 * 0.5 * f32::EPSILON;
 
 /// Points of a light that the lanes of a block look at.
 #[derive(Clone, Copy, Debug)]
@@ -48,14 +48,19 @@ pub fn unoccluded(packet: &RayPacket) -> F32 {
     packet.t_far.map(|t| if t != f32::NEG_INFINITY { 1.0 } else { 0.0 })
 }
 
-/// Adds the light to the lanes of `block` as far as it is visible from there.
-pub fn add(block: &mut Block, light: &Light, lit: Lit<'_>) {
+/// Whether any lane of `block` has a highlight: if not, there is no power to take.
+#[inline]
+#[must_use]
+pub fn shines(block: &Block) -> bool {
+    block.specular.iter().flatten().any(|&s| s != 0.0)
+}
+
+/// Adds the light to the lanes of `block` as far as it is visible from there, highlights only if it `shines`.
+pub fn add(block: &mut Block, light: &Light, lit: Lit<'_>, shines: bool) {
     let view = match lit.seen_from {
         None => block.to_eye,
         Some(eye) => towards(block, eye),
     };
-    // Nothing shines here: no power to take.
-    let shines = block.specular.iter().flatten().any(|&s| s != 0.0);
     match (shines, light.falloff.is_some()) {
         (false, false) => simd::run(Add::<false, false> { block, light, lit, view: &view }),
         (false, true) => simd::run(Add::<false, true> { block, light, lit, view: &view }),
@@ -105,8 +110,10 @@ impl<const POINTS: bool> Kernel for Aim<'_, POINTS> {
             let lit = (along(&b.ng, to_light) > 0.0) & (along(&b.ns, to_light) > 0.0);
             let end = if POINTS { [0, 1, 2].map(|k| self.points[k][i]) } else { l };
             let above = !POINTS || along(&b.ng, [0, 1, 2].map(|k| end[k] - b.p[k][i])) > 0.0;
-            t_far[i] = if live & lit & above { BEFORE_THE_LIGHT } else { f32::NEG_INFINITY };
-            sent += u32::from(live & lit & above);
+            // All that makes a shadow ray needless comes together here.
+            let asks = live & lit & above;
+            t_far[i] = if asks { BEFORE_THE_LIGHT } else { f32::NEG_INFINITY };
+            sent += u32::from(asks);
             away += u32::from(live & !lit);
             for k in 0..3 {
                 let to = (end[k] - f64::from(b.front[k][i])) as f32;
@@ -224,7 +231,8 @@ mod tests {
         aim(b, light, Target::Center, &mut packet);
         let before = Block::vec3(&b.color, 0);
         let to_light = [packet.d_x, packet.d_y, packet.d_z];
-        add(b, light, Lit { visible: &unoccluded(&packet), to_light: &to_light, seen_from });
+        let shining = shines(b);
+        add(b, light, Lit { visible: &unoccluded(&packet), to_light: &to_light, seen_from }, shining);
         Block::vec3(&b.color, 0) - before
     }
 

@@ -14,6 +14,7 @@ mod media;
 pub mod optics;
 pub(crate) mod paint;
 mod pixel;
+mod reach;
 mod rounds;
 mod shade;
 mod shapes;
@@ -24,20 +25,21 @@ mod wave;
 mod worker;
 
 pub use explain::explain_pixel;
-pub use job::{Adapted, Control, Crop, Ended, Job, Outcome, RayCounts, RenderStats, Stop};
+pub use job::{Adapted, Control, Crop, Ended, Job, Outcome, RayCounts, RenderStats, Stop, Work};
 pub use surface::SurfacePoint;
 pub use surfaces::Surfaces;
 
 use crate::backend::{AnyBackend, Backend};
 use crate::film::{Aov, Film};
 use crate::math::{Sampler, Sampling};
-use crate::scene::{Camera, CameraDesc, Needs, Scene};
+use crate::scene::{Camera, CameraDesc, Needs, Scene, Skip};
 use adapt::Progress;
 use area::Area;
 use certificate::Radiance;
 use contacts::Contacts;
 use estimate::{ErrorSum, Twice};
 use pixel::{FirstHits, PixelSum};
+use reach::Reach;
 use rounds::Rounds;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -85,14 +87,15 @@ pub fn run_with<B: Backend>(
     job: &Job,
     control: &Control,
 ) -> Result<Outcome, String> {
+    let job = &job.settled();
     let camera = camera.prepare(&scene.frame, job.size)?;
     if job.is_adaptive() && job.sampler == Sampler::Stratified {
         return Err("stratified samples are spread as a whole: how many there are must be known before".into());
     }
-    let needs = scene.needs();
+    let needs = Needs::of(scene, job.skips);
     let sampling = job.sampling(&camera);
     let twice = (job.is_adaptive() || (job.estimate && job.spp > 1)).then(|| Twice::of(job.crop, job.seed));
-    let outcome = if needs.secondary_rays() {
+    let outcome = if needs.secondary_rays() || !job.skips.has(Skip::Secondary) {
         Render::<B, true> { scene, camera, backend, job, control, needs, sampling, twice }.run()
     } else {
         Render::<B, false> { scene, camera, backend, job, control, needs, sampling, twice }.run()
@@ -134,6 +137,7 @@ struct Common {
     tiles: Vec<Crop>,
     radiance: Radiance,
     contacts: Contacts,
+    reach: Option<Reach>,
 }
 
 impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
@@ -143,6 +147,12 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
             tiles: tile::tiles(self.job.crop),
             radiance: Radiance::of(self.scene, &self.needs, self.job.k_max),
             contacts: if self.needs.refraction { Contacts::of(self.scene) } else { Contacts::default() },
+            reach: self
+                .job
+                .skips
+                .has(Skip::Bounds)
+                .then(|| Reach::of(self.scene, &self.camera, self.job.size))
+                .flatten(),
         };
         match self.twice {
             Some(twice) if self.job.is_adaptive() => Rounds::new(self, &common, twice).run(),
@@ -155,7 +165,7 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
         let sum = Mutex::new(self.nothing(common));
         let next = AtomicUsize::new(0);
         rayon::broadcast(|_| {
-            let mut worker = TileWorker::new(self, &common.radiance, &common.contacts);
+            let mut worker = TileWorker::new(self, common);
             let mut area = Area::default();
             while !self.control.is_cancelled() {
                 let index = next.fetch_add(1, Relaxed);
@@ -206,6 +216,9 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
             non_finite_samples: sum.non_finite,
             shadow_rays_facing_away: sum.tally.facing_away,
             branches_below_cut: sum.tally.below_cut,
+            work: sum.tally.work,
+            packets_outside: sum.tally.packets_outside,
+            blocks_without_highlight: sum.tally.dull,
         };
         Outcome { film: sum.film, stats }
     }
@@ -219,6 +232,9 @@ impl Tally {
         self.rays.refracted += o.rays.refracted;
         self.facing_away += o.facing_away;
         self.below_cut += o.below_cut;
+        self.work.add(&o.work);
+        self.packets_outside += o.packets_outside;
+        self.dull += o.dull;
         self.again += o.again;
         self.brightest = self.brightest.max(o.brightest);
     }

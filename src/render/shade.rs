@@ -93,6 +93,8 @@ fn branches(
     let (mut mirrored, mut passed) = match material.reflect {
         Reflect::Constant(weight) => (weight, material.refract),
         Reflect::Metal(color) => (color + (Vec3::ONE - color) * optics::schlick(cos_i) as f32, material.refract),
+        // The equations say the same, but for 0 / 0 where the ray grazes.
+        Reflect::Fresnel if eta == 1.0 => (Vec3::ZERO, material.refract),
         Reflect::Fresnel => {
             let f = refraction.map_or(1.0, |r| r.reflectance(cos_i, eta)) as f32;
             (Vec3::splat(f), material.refract * (1.0 - f))

@@ -4,7 +4,7 @@ use super::job::{Crop, Job};
 use crate::geom::{LANES, PacketBatch, RayHitPacket};
 use crate::math::{PixelSamples, Sampling, concentric_disc, polar_disc, rejection_disc, uniform_radius_disc};
 use crate::scene::desc::LensSampler;
-use crate::scene::{Camera, CameraRays};
+use crate::scene::{Camera, CameraRays, Skip};
 use crate::simd;
 use glam::DVec2;
 use std::ops::Range;
@@ -108,35 +108,53 @@ impl<'a> Segment<'a> {
         job.filter.weight(job.offset(a), job.offset(b))
     }
 
-    /// Fills `batch` with the camera rays.
-    pub fn camera_rays(&self, camera: &Camera, job: &Job, batch: &mut PacketBatch<RayHitPacket>) {
+    /// Fills `batch` with the camera rays; what was drawn for each.
+    pub fn camera_rays(&self, camera: &Camera, job: &Job, batch: &mut PacketBatch<RayHitPacket>) -> Drawn {
         batch.resize(self.pixels.len() * self.samples as usize);
         let samples = self.first..self.first + self.samples;
         let mut points = self.pixels.iter().flat_map(|&pixel| samples.clone().map(move |sample| (pixel, sample)));
         let (mut at, mut lens) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
+        let drawn = Drawn::of(camera, job);
         for (packet, live) in batch.packets_mut() {
             for (lane, (pixel, sample)) in points.by_ref().take(live).enumerate() {
-                let (x, y, disc) = image_point(camera, job, self.sampling, pixel, sample);
+                let (x, y, disc) = image_point(drawn, job, self.sampling, pixel, sample);
                 (at[0][lane], at[1][lane]) = (x, y);
                 (lens[0][lane], lens[1][lane]) = (disc.x, disc.y);
             }
             simd::run(CameraRays { camera, at: &at, lens: &lens, packet: &mut packet.ray });
         }
+        drawn
+    }
+}
+
+/// What is drawn for a camera ray.
+#[derive(Clone, Copy, Debug)]
+pub struct Drawn {
+    /// The sample's point.
+    pub pixel: bool,
+    /// A point of the lens from it.
+    pub lens: bool,
+}
+
+impl Drawn {
+    fn of(camera: &Camera, job: &Job) -> Self {
+        let lens = camera.lens.is_some() || !job.skips.has(Skip::Lens);
+        Self { pixel: job.spp > 1 || lens || !job.skips.has(Skip::Jitter), lens }
     }
 }
 
 /// Where sample `sample` of `pixel` goes through the image, in pixels, and through the unit lens.
 #[inline]
-fn image_point(camera: &Camera, job: &Job, sampling: &Sampling, pixel: (u32, u32), sample: u32) -> (f64, f64, DVec2) {
+fn image_point(drawn: Drawn, job: &Job, sampling: &Sampling, pixel: (u32, u32), sample: u32) -> (f64, f64, DVec2) {
     let (x, y) = (f64::from(pixel.0), f64::from(pixel.1));
     let lone = if job.centre { CENTRE } else { BESIDE_CENTRE };
-    if job.spp == 1 && camera.lens.is_none() {
+    if !drawn.pixel {
         return (x + lone.0, y + lone.1, DVec2::ZERO);
     }
     let samples = sampling.pixel(pixel.0, pixel.1);
     let [a, b, u, v] = samples.point(sample);
     let (dx, dy) = if job.spp == 1 { lone } else { (0.5 + job.offset(a), 0.5 + job.offset(b)) };
-    let disc = if camera.lens.is_some() { on_lens(job.lens_sampler, samples, sample, [u, v]) } else { DVec2::ZERO };
+    let disc = if drawn.lens { on_lens(job.lens_sampler, samples, sample, [u, v]) } else { DVec2::ZERO };
     (x + dx, y + dy, disc)
 }
 

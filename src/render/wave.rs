@@ -5,18 +5,20 @@ use super::block::{Block, F32, Hits, Path};
 use super::certificate::{Bound, Radiance};
 use super::contacts::Contacts;
 use super::facets::Facets;
-use super::job::{Job, RayCounts};
+use super::job::{Job, RayCounts, Work};
 use super::lights::{self, Lit, Target};
 use super::media::{Media, Medium};
 use super::paint::Palette;
+use super::reach::Reach;
 use super::shade::{self, Branch};
 use super::shapes::ShapeHits;
 use super::surface::SurfacePoint;
-use super::tile::Segment;
+use super::tile::{Drawn, Segment};
+use super::{Common, Render};
 use crate::backend::Backend;
 use crate::film::Aov;
 use crate::geom::{Coherence, INVALID_ID, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
-use crate::scene::{Camera, Light, Needs, Object, Scene};
+use crate::scene::{Light, Material, Object, Reflect, Scene, Skip};
 use glam::{DVec3, Vec3};
 
 /// Most secondary rays worked on at once; the rest waits, newest first, so that memory is
@@ -56,6 +58,12 @@ pub struct Tally {
     pub facing_away: u64,
     /// Branches below the weight cut.
     pub below_cut: u64,
+    /// What was done that can be left out.
+    pub work: Work,
+    /// Packets of camera rays that the backend was not asked about.
+    pub packets_outside: u64,
+    /// Blocks without a highlight, once for each light that shone on them.
+    pub dull: u64,
     /// Rays of all kinds that were sent to compare with, and are not counted above.
     pub again: u64,
     /// Largest answer of a surface to all lights; kept only where a bound needs it.
@@ -71,6 +79,7 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
     job: &'a Job,
     radiance: &'a Radiance,
     contacts: &'a Contacts,
+    reach: Option<&'a Reach>,
     /// The lights that can change anything.
     lights: Vec<Light>,
     /// Where highlights are seen from at every depth; `None`: from where each ray came.
@@ -94,6 +103,8 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
     shadows: PacketBatch<RayPacket>,
     /// The block of each shadow packet.
     shadowed: Vec<u32>,
+    /// The lanes of each whose answers do not count, if such rays are sent too.
+    needless: Vec<[bool; LANES]>,
     /// Unoccluded share of a light with a size, for each block.
     visible: Vec<F32>,
     media: Media,
@@ -106,44 +117,48 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
 
 impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     /// An integrator with empty buffers.
-    pub fn new(
-        scene: &'a Scene,
-        camera: &Camera,
-        backend: &'a B,
-        job: &'a Job,
-        needs: &Needs,
-        radiance: &'a Radiance,
-        contacts: &'a Contacts,
-    ) -> Self {
-        let cost = job.aovs.contains(&Aov::Cost).then(Vec::new);
-        let seen = job.aovs.iter().any(|&a| !matches!(a, Aov::Cost | Aov::Samples)).then(Vec::new);
-        let lights = scene.lights.iter().filter(|l| needs.shadow_rays && l.color != Vec3::ZERO);
+    pub fn new(render: &'a Render<'a, B, SECONDARY>, common: &'a Common) -> Self {
+        let Render { scene, camera, backend, job, needs, .. } = *render;
+        let skips = job.skips;
+        let always = !skips.has(Skip::Aovs);
+        let cost = always || job.aovs.contains(&Aov::Cost);
+        let seen = always || job.aovs.iter().any(|&a| !matches!(a, Aov::Cost | Aov::Samples));
         let is_shapes: Vec<bool> = scene.objects.iter().map(|o| matches!(o, Object::Shapes(_))).collect();
+        let both = !skips.has(Skip::Geometry);
+        let (meshes, shapes) = (both || is_shapes.contains(&false), both || is_shapes.contains(&true));
+        let facets = || {
+            let facets = Facets::new(scene);
+            Box::new(if skips.has(Skip::Normals) { facets } else { facets.always_smooth() })
+        };
+        // Where light bends, a boundary of index 1 may be one between two media.
+        let ask_fresnel = needs.refraction || !skips.has(Skip::Fresnel);
+        let branches = |m: &Material| m.reflects() || m.refracts() || (ask_fresnel && m.reflect == Reflect::Fresnel);
         Self {
             scene,
             backend,
             job,
-            radiance,
-            contacts,
-            lights: lights.copied().collect(),
+            radiance: &common.radiance,
+            contacts: &common.contacts,
+            reach: common.reach.as_ref(),
+            lights: if needs.shadow_rays { lights(scene, !skips.has(Skip::DarkLights)) } else { Vec::new() },
             seen_from: scene.course_rules.then_some(camera.eye),
             clip: camera.clip,
             palette: Palette::of(scene),
-            branching: scene.materials.iter().map(|m| m.reflects() || m.refracts()).collect(),
-
+            branching: scene.materials.iter().map(branches).collect(),
             absorbs: needs.absorption,
-            facets: is_shapes.contains(&false).then(|| Box::new(Facets::new(scene))),
-            shape_hits: is_shapes.contains(&true).then(Box::default),
-            is_mixed: is_shapes.contains(&false) && is_shapes.contains(&true),
+            facets: meshes.then(facets),
+            shape_hits: shapes.then(Box::default),
+            is_mixed: meshes && shapes,
             is_shapes,
             blocks: Vec::new(),
             used: 0,
             shadows: PacketBatch::default(),
             shadowed: Vec::new(),
+            needless: Vec::new(),
             visible: Vec::new(),
             media: Media::new(),
             waiting: Vec::new(),
-            gathered: Gathered { cost, seen, ..Gathered::default() },
+            gathered: Gathered { cost: cost.then(Vec::new), seen: seen.then(Vec::new), ..Gathered::default() },
             tally: Tally::default(),
         }
     }
@@ -164,13 +179,17 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             cost.resize(samples, 1);
         }
         self.tally.rays.camera += samples as u64;
-        self.backend.intersect_many(batch, coherence);
+        match self.reach {
+            Some(reach) => self.tally.packets_outside += reach.intersect_many(self.backend, batch, coherence),
+            None => self.backend.intersect_many(batch, coherence),
+        }
         if let Some(range) = self.clip {
             batch.packets_mut().for_each(|(packet, live)| clip(packet, live, range));
         }
         self.collect(batch, |i| Path::of_sample(i as u32));
         if let Some(seen) = &mut self.gathered.seen {
             seen.clear();
+            self.tally.work.hits_kept += self.blocks[..self.used].iter().map(|b| b.len as u64).sum::<u64>();
             for block in &self.blocks[..self.used] {
                 seen.extend((0..block.len).map(|lane| (block.slot[lane], SurfacePoint::of_lane(block, lane))));
             }
@@ -202,9 +221,12 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     /// Misses take the background, hits fill blocks.
     fn collect(&mut self, batch: &PacketBatch<RayHitPacket>, path: impl Fn(usize) -> Path) {
         self.used = 0;
+        self.tally.work.hits_sorted += if self.is_mixed { batch.len() as u64 } else { 0 };
         self.misses(batch, &path);
         if let Some(mut hits) = self.facets.take() {
+            let before = hits.smooth_blocks;
             self.fill_blocks(&mut *hits, batch, false, &path);
+            self.tally.work.smooth_blocks += hits.smooth_blocks - before;
             self.facets = Some(hits);
         }
         if let Some(mut hits) = self.shape_hits.take() {
@@ -327,13 +349,13 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
 
     /// Adds one light to all blocks: its shadow rays go out as one batch.
     fn light(&mut self, index: usize) {
-        let light = self.lights[index];
+        let (light, power) = (self.lights[index], !self.job.skips.has(Skip::Powf));
         self.send_shadow_rays(|_, block, packet| lights::aim(block, &light, Target::Center, packet));
         for (packet, &i) in self.shadows.packets().iter().zip(&self.shadowed) {
             let to_light = [packet.d_x, packet.d_y, packet.d_z];
             let visible = lights::unoccluded(packet);
             let lit = Lit { visible: &visible, to_light: &to_light, seen_from: self.seen_from };
-            lights::add(&mut self.blocks[i as usize], &light, lit);
+            add(&mut self.blocks[i as usize], &light, lit, power, &mut self.tally);
         }
     }
 
@@ -358,13 +380,13 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
                 }
             }
         }
-        let share = 1.0 / rounds as f32;
+        let (share, power) = (1.0 / rounds as f32, !self.job.skips.has(Skip::Powf));
         for (block, visible) in self.blocks[..self.used].iter_mut().zip(&self.visible) {
             if visible.iter().any(|&v| v > 0.0) {
                 let visible = visible.map(|v| v * share);
                 let to_light = lights::to_center(block, &light);
                 let lit = Lit { visible: &visible, to_light: &to_light, seen_from: self.seen_from };
-                lights::add(block, &light, lit);
+                add(block, &light, lit, power, &mut self.tally);
             }
         }
     }
@@ -374,9 +396,15 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     fn send_shadow_rays(&mut self, aim: impl Fn(usize, &Block, &mut RayPacket) -> (u32, u32)) {
         self.shadows.clear();
         self.shadowed.clear();
+        self.needless.clear();
         for (i, block) in self.blocks[..self.used].iter().enumerate() {
             let packet = self.shadows.push_packet();
-            let (sent, facing_away) = aim(i, block, packet);
+            let (mut sent, mut facing_away) = aim(i, block, packet);
+            if !self.job.skips.has(Skip::ShadowRays) {
+                self.needless.push(packet.t_far.map(|t| t == f32::NEG_INFINITY));
+                packet.t_far[..block.len].fill(lights::BEFORE_THE_LIGHT);
+                (sent, facing_away) = (block.len as u32, 0);
+            }
             self.tally.facing_away += u64::from(facing_away);
             self.tally.rays.shadow += u64::from(sent);
             if sent == 0 {
@@ -389,13 +417,42 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
                 lanes.for_each(|lane| cost[block.slot[lane] as usize] += 1);
             }
         }
-        self.backend.occluded_many(&mut self.shadows, Coherence::Coherent);
+        self.answer_shadow_rays();
+    }
+
+    /// Asks the backend about `shadows`, and drops the answers that were not needed.
+    fn answer_shadow_rays(&mut self) {
+        if self.job.skips.has(Skip::AnyHit) {
+            self.backend.occluded_many(&mut self.shadows, Coherence::Coherent);
+        } else {
+            self.nearest_occluders();
+        }
+        for ((packet, _), needless) in self.shadows.packets_mut().zip(&self.needless) {
+            for (t_far, &needless) in packet.t_far.iter_mut().zip(needless) {
+                *t_far = if needless { f32::NEG_INFINITY } else { *t_far };
+            }
+        }
+    }
+
+    /// Whether anything is in the way by what is nearest, where any hit would do.
+    fn nearest_occluders(&mut self) {
+        self.tally.work.nearest_occluders += self.shadows.len() as u64;
+        let mut batch = PacketBatch::<RayHitPacket>::default();
+        batch.resize(self.shadows.len());
+        batch.packets_mut().zip(self.shadows.packets()).for_each(|((to, _), from)| to.ray = from.clone());
+        self.backend.intersect_many(&mut batch, Coherence::Coherent);
+        for ((packet, _), found) in self.shadows.packets_mut().zip(batch.packets()) {
+            for (t_far, &geom) in packet.t_far.iter_mut().zip(&found.hit.geom_id) {
+                *t_far = if geom == INVALID_ID { *t_far } else { f32::NEG_INFINITY };
+            }
+        }
     }
 
     /// Sends on the mirrored and refracted branches of all blocks.
     fn branch(&mut self) {
         let blocks = std::mem::take(&mut self.blocks);
         for block in &blocks[..self.used] {
+            self.tally.work.hits_asked_on += block.len as u64;
             for lane in 0..block.len {
                 if self.branching[block.material[lane] as usize] {
                     self.branch_lane(block, lane);
@@ -453,6 +510,32 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         };
         self.waiting.push(Waiting { path, ray });
     }
+}
+
+impl Tally {
+    /// Counts what was drawn for so many camera rays.
+    pub fn note_drawn(&mut self, drawn: Drawn, rays: usize) {
+        self.work.pixel_points += if drawn.pixel { rays as u64 } else { 0 };
+        self.work.lens_points += if drawn.lens { rays as u64 } else { 0 };
+    }
+}
+
+/// The lights that can change anything, and the others behind them if those are to be asked too: samples go by the
+/// numbers of lights.
+fn lights(scene: &Scene, dark_too: bool) -> Vec<Light> {
+    let (mut lights, dark): (Vec<_>, Vec<_>) = scene.lights.iter().copied().partition(|l| l.color != Vec3::ZERO);
+    if dark_too {
+        lights.extend(dark);
+    }
+    lights
+}
+
+/// Adds a light to a block; with `power` highlights are computed even where there are none.
+fn add(block: &mut Block, light: &Light, lit: Lit<'_>, power: bool, tally: &mut Tally) {
+    let shines = power || lights::shines(block);
+    tally.dull += u64::from(!shines);
+    tally.work.highlights += u64::from(shines);
+    lights::add(block, light, lit, shines);
 }
 
 impl Gathered {

@@ -1,12 +1,10 @@
 //! One thread's part of a render: samples of pixels, by segments.
 
-use super::Render;
-use super::certificate::Radiance;
-use super::contacts::Contacts;
 use super::estimate::Twice;
 use super::pixel::{FirstHits, PixelSum};
 use super::tile::{self, Segment};
 use super::wave::{Tally, Waves};
+use super::{Common, Render};
 use crate::backend::Backend;
 use crate::geom::{Coherence, LANES, PacketBatch, RayHitPacket};
 use crate::math::Sampling;
@@ -70,9 +68,8 @@ pub struct TileWorker<'a, B, const SECONDARY: bool> {
 
 impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
     /// Empty buffers.
-    pub fn new(render: &'a Render<'a, B, SECONDARY>, radiance: &'a Radiance, contacts: &'a Contacts) -> Self {
-        let waves =
-            Waves::new(render.scene, &render.camera, render.backend, render.job, &render.needs, radiance, contacts);
+    pub fn new(render: &'a Render<'a, B, SECONDARY>, common: &'a Common) -> Self {
+        let waves = Waves::new(render, common);
         Self { render, waves, batch: PacketBatch::default() }
     }
 
@@ -101,7 +98,8 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
                 return false;
             }
             let before = self.waves.tally.rays.total();
-            segment.camera_rays(&self.render.camera, self.render.job, &mut self.batch);
+            let drawn = segment.camera_rays(&self.render.camera, self.render.job, &mut self.batch);
+            self.waves.tally.note_drawn(drawn, self.batch.len());
             self.waves.trace(&mut self.batch, &segment, Coherence::Coherent);
             self.add_up(&mut sums[first_pixel..], &segment);
             if !hits.is_empty() {
