@@ -10,7 +10,7 @@ use super::surface::SurfacePoint;
 use super::tile::Segment;
 use crate::backend::{AnyBackend, Backend};
 use crate::geom::{Coherence, Hit, LANES, PacketBatch, Ray, RayPacket};
-use crate::scene::{CameraDesc, Light, Scene};
+use crate::scene::{CameraDesc, Light, Needs, Scene};
 use glam::{DVec3, Vec3};
 use std::fmt::Write;
 
@@ -52,6 +52,7 @@ struct Told<'a> {
     seen_from: Option<DVec3>,
     clip: Option<(f64, f64)>,
     contacts: Contacts,
+    needs: Needs,
     media: Media,
     out: String,
 }
@@ -75,6 +76,7 @@ impl<B: Backend> Teller<'_, B> {
             seen_from: self.scene.course_rules.then_some(camera.eye),
             clip: camera.clip,
             contacts: Contacts::of(self.scene),
+            needs: self.scene.needs(),
             media: Media::new(),
             out: String::new(),
         };
@@ -192,7 +194,7 @@ impl<B: Backend> Teller<'_, B> {
 
     fn branches(&self, path: &Path, point: &SurfacePoint, stack: &mut Vec<Pending>, told: &mut Told<'_>, indent: &str) {
         let m = &self.scene.materials[point.material];
-        if !(m.reflects() || m.refracts()) {
+        if !told.needs.may_branch(m) {
             return;
         }
         let d: DVec3 = -point.to_eye.as_dvec3().normalize();

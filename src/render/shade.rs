@@ -175,6 +175,16 @@ mod tests {
     }
 
     #[test]
+    fn equal_indices_mirror_nothing_at_any_angle() {
+        let same = Material { ior: 1.0, ..glass(Reflect::Fresnel) };
+        for (x, y) in [(0.0, 1.0), (0.8, 0.6), (1.0, 0.0)] {
+            let d = DVec3::new(x, -y, 0.0);
+            let (r, t) = branches(&same, &point(true), d, 1.0, optics::refract);
+            assert!(r.is_none() && t.expect("it passes").weight == same.refract, "{d}");
+        }
+    }
+
+    #[test]
     fn a_tilted_shading_normal_sends_no_ray_through_the_facet() {
         let tilted = SurfacePoint { ns: DVec3::new(0.6, 0.8, 0.0), ..point(true) };
         let d = DVec3::new(-0.9, -0.1, 0.0).normalize();

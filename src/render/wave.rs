@@ -130,9 +130,8 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             let facets = Facets::new(scene);
             Box::new(if skips.has(Skip::Normals) { facets } else { facets.always_smooth() })
         };
-        // Where light bends, a boundary of index 1 may be one between two media.
-        let ask_fresnel = needs.refraction || !skips.has(Skip::Fresnel);
-        let branches = |m: &Material| m.reflects() || m.refracts() || (ask_fresnel && m.reflect == Reflect::Fresnel);
+        let ask_fresnel = !skips.has(Skip::Fresnel);
+        let branches = |m: &Material| needs.may_branch(m) || (ask_fresnel && m.reflect == Reflect::Fresnel);
         Self {
             scene,
             backend,

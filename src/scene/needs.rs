@@ -50,6 +50,13 @@ impl Needs {
         self.reflection || self.refraction
     }
 
+    /// Whether hits of a material may send rays on. Where something refracts, a boundary of index 1 may be one between two
+    /// media, and mirrors.
+    #[must_use]
+    pub fn may_branch(&self, m: &super::Material) -> bool {
+        m.reflects() || m.refracts() || (self.refraction && m.reflect == Reflect::Fresnel)
+    }
+
     /// Each need by name.
     #[must_use]
     pub fn list(&self) -> [(&'static str, bool); 8] {
