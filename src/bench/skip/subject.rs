@@ -136,11 +136,12 @@ impl Assets {
     /// # Errors
     /// If they cannot be written.
     pub fn new(scale: Scale) -> std::io::Result<Self> {
-        let (parts, pixels) = if scale == Scale::Small { (6, 8) } else { (120, 1024) };
+        let (parts, pixels) = if scale == Scale::Small { (6, 8) } else { (120, 2048) };
         let folder = tempfile::tempdir()?;
         std::fs::write(folder.path().join("gem.obj"), gem_file(parts))?;
         let shade = |x: u32, y: u32| image::Rgb([(x * 7 % 256) as u8, (y * 5 % 256) as u8, ((x ^ y) % 256) as u8]);
-        for name in ["used.png", "spare.png"] {
+        // The one that is shown is small: it is read at the same time.
+        for (name, pixels) in [("used.png", 8), ("spare.png", pixels)] {
             let image = RgbImage::from_fn(pixels, pixels, shade);
             image.save(folder.path().join(name)).map_err(std::io::Error::other)?;
         }
