@@ -155,6 +155,16 @@ impl AnyBackend {
         }
     }
 
+    /// Whether the hierarchy was built quickly rather than well.
+    #[must_use]
+    pub fn is_quick(&self) -> bool {
+        match self {
+            #[cfg(feature = "embree")]
+            Self::Embree(b) => b.is_quick(),
+            Self::Native(b) => b.quality() == native::Quality::Fast,
+        }
+    }
+
     /// A few words for the summary: release, packet width, build quality.
     #[must_use]
     pub fn details(&self) -> String {

@@ -37,6 +37,12 @@ impl EmbreeBackend {
         self.device.memory_live()
     }
 
+    /// Whether it was built quickly rather than well.
+    #[must_use]
+    pub fn is_quick(&self) -> bool {
+        matches!(self.quality, Quality::Low)
+    }
+
     /// Release, packet width, build quality.
     #[must_use]
     pub fn details(&self) -> String {

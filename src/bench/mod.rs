@@ -11,12 +11,14 @@
 //! | `leaving` | rays that leave surfaces: how many meet them again |
 //! | `cost` | the time of a test and of a refinement |
 //! | `stability` | all of that in one report |
+//! | `skip` | what is left out: what that saves, and that it changes nothing |
 //! | `speed` | the native tracer against Embree |
 //! | `error` | run time against error of whole pictures |
-//! | `report`, `plot` | tables, pages, SVG |
+//! | `report`, `plot`, `bars` | tables, pages, SVG |
 //!
 //! The tests ask the same questions with fewer rays.
 
+pub mod bars;
 pub mod closed;
 pub mod cost;
 pub mod error;
@@ -25,6 +27,7 @@ pub mod plot;
 pub mod report;
 pub mod robust;
 pub mod setup;
+pub mod skip;
 pub mod speed;
 pub mod stability;
 pub mod textbook;

@@ -1,5 +1,6 @@
 //! What was measured, as text, JSON and a page with plots.
 
+use super::bars::Bars;
 use super::plot::{Plot, escaped};
 use crate::film::{self, Display, Film, Format, Notes};
 use base64::prelude::{BASE64_STANDARD, Engine};
@@ -86,6 +87,8 @@ pub struct Table {
     pub columns: Vec<String>,
     /// As many words each.
     pub rows: Vec<Vec<String>>,
+    /// What of it a page shows as bars.
+    pub bars: Option<Bars>,
 }
 
 /// Where a measurement was made.
@@ -135,7 +138,7 @@ impl Table {
     /// A table with these columns and no rows.
     #[must_use]
     pub fn new(columns: &[&str]) -> Self {
-        Self { columns: columns.iter().map(|&c| c.to_owned()).collect(), rows: Vec::new() }
+        Self { columns: columns.iter().map(|&c| c.to_owned()).collect(), ..Self::default() }
     }
 
     /// Words to the left in the first column, to the right in the others.
@@ -169,7 +172,8 @@ impl Table {
         };
         let rows: String = self.rows.iter().map(|r| row(r, "td")).collect();
         let head = row(&self.columns, "th");
-        format!("<div class=\"table\"><table>\n<thead>{head}</thead>\n<tbody>\n{rows}</tbody>\n</table></div>\n")
+        let bars = self.bars.as_ref().map_or(String::new(), Bars::svg);
+        format!("{bars}<div class=\"table\"><table>\n<thead>{head}</thead>\n<tbody>\n{rows}</tbody>\n</table></div>\n")
     }
 }
 

@@ -167,7 +167,7 @@ fn wrong_of(sweep: Sweep, shape: Shape) -> Result<Section, Error> {
     }
     let names: Vec<&'static str> = found[0].1.iter().map(|(name, _)| *name).collect();
     let mut table =
-        Table { columns: [sweep.axis()].iter().chain(&names).map(|&n| n.to_owned()).collect(), rows: vec![] };
+        Table { columns: [sweep.axis()].iter().chain(&names).map(|&n| n.to_owned()).collect(), ..Table::default() };
     let mut data = Vec::new();
     for (value, counts) in &found {
         let error = |t: f64| if t == 0.0 { "0".to_owned() } else { format!("{t:.0e}") };

@@ -14,6 +14,7 @@ use tison::film::{Aov, Tonemap};
 use tison::math::{Filter, Sampler};
 use tison::scene::desc::LensSampler;
 use tison::scene::obj::Reader;
+use tison::scene::{Skip, Skips};
 
 /// What the whole help ends with.
 const AFTER_HELP: &str = "\
@@ -216,6 +217,9 @@ pub struct RenderArgs {
     /// Print what decides the picture, and whether a flag, the scene file or a default says so; render nothing
     #[arg(long, conflicts_with_all = ["pixel", "stats"], help_heading = "Running")]
     pub print_config: bool,
+    /// Do what the scene does not need too, to see what leaving it out changes and saves; may be repeated
+    #[arg(long, value_name = "NAME", value_parser = skip(), hide = true, help_heading = "Running")]
+    pub no_skip: Vec<Skips>,
 }
 
 /// What decides the pixels, but for the camera. What is not given here the scene file may say;
@@ -396,6 +400,12 @@ pub enum ProgressMode {
     Json,
     /// Nothing
     None,
+}
+
+/// What remains switched on.
+fn skip() -> impl TypedValueParser<Value = Skips> {
+    PossibleValuesParser::new(Skip::ALL.iter().map(|skip| skip.name()).chain(["all"]))
+        .map(|name| Skip::parse(&name).map_or(Skips::NONE, |skip| Skips::ALL.without(skip)))
 }
 
 fn aov() -> impl TypedValueParser<Value = Aov> {

@@ -23,6 +23,7 @@ pub fn of_run(args: &RenderArgs, plan: &Plan) -> Vec<Setting> {
     list.extend(plan.smooth.map(|angle| given("smooth", angle.to_string())));
     list.extend(plan.camera.turntable.map(|n| given("turntable", n.to_string())));
     list.extend(plan.allow.iter().map(|dir| given("allow-path", dir.display().to_string())));
+    list.extend(plan.skips.off().map(|skip| given("no-skip", skip.name().into())));
     list.extend(plan.defines.iter().map(|define| given("-D", define.clone())));
     list
 }

@@ -62,6 +62,7 @@ fn load(file: &Path, reading: &ReadingArgs) -> Result<Loaded, Failure> {
         Signals::install(&control).map_err(|e| Failure::new(Exit::Internal, "cannot listen for signals").because(e))?;
     let progress = Progress::start(ProgressMode::Auto, &control);
     let reading = Reading {
+        skips: tison::scene::Skips::ALL,
         exact: false,
         reader: reading.obj_reader,
         smooth: None,

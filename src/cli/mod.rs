@@ -25,6 +25,7 @@ mod render;
 mod report;
 mod settings;
 mod signals;
+mod skipped;
 mod stats;
 mod style;
 mod system;

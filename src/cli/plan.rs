@@ -12,6 +12,7 @@ use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use tison::film::{self, Aov};
+use tison::scene::Skips;
 use tison::scene::desc::RenderDesc;
 use tison::scene::format;
 use tison::scene::obj::Reader;
@@ -35,6 +36,8 @@ pub struct Plan {
     pub camera: CameraArgs,
     /// Auxiliary images, each once.
     pub aovs: Vec<Aov>,
+    /// What is left out where nothing needs it.
+    pub skips: Skips,
     /// Who reads meshes.
     pub reader: Reader,
     /// Who answers the rays.
@@ -110,6 +113,7 @@ impl Plan {
             picture: args.picture.clone(),
             camera: args.camera.clone(),
             aovs: each_once(&args.aov),
+            skips: args.no_skip.iter().fold(Skips::ALL, |all, &one| all.and(one)),
             threads: args.threads.map_or_else(all_threads, usize::from),
             progress: if args.quiet { ProgressMode::None } else { args.progress },
             quiet: args.quiet,

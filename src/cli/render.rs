@@ -24,7 +24,7 @@ use tison::metrics::Difference;
 use tison::render::{self, Adapted, Control, Job, Outcome, RenderStats, Stop};
 use tison::scene::format::Override;
 use tison::scene::obj::Reader;
-use tison::scene::{self, CameraDesc, Light, LoadOptions, Loaded, Scene};
+use tison::scene::{self, CameraDesc, Light, LoadOptions, Loaded, Scene, Skip, Skips};
 
 /// Does what the plan says.
 pub fn render(plan: &Plan, messages: &Messages) -> Result<Exit, Failure> {
@@ -266,6 +266,7 @@ impl Run<'_> {
         let plan = self.plan;
         self.progress.stage(Stage::Read);
         let reading = Reading {
+            skips: plan.skips,
             exact: false,
             reader: plan.reader,
             smooth: plan.smooth,
@@ -307,9 +308,11 @@ impl Run<'_> {
         self.progress.expect_pixels(pixels * self.plan.backend.kinds().len() as u64);
         let at_light = |l: &Light| if l.radius > 0.0 { u64::from(job.light_samples) } else { 1 };
         let rays_per_sample = 1 + scene.lights.iter().map(at_light).sum::<u64>();
+        let rays = pixels.saturating_mul(u64::from(job.spp)).saturating_mul(rays_per_sample);
         let options = BuildOptions {
             threads: self.plan.threads,
-            rays_expected: pixels.saturating_mul(u64::from(job.spp)).saturating_mul(rays_per_sample),
+            // However many there may be, a good hierarchy is worth while.
+            rays_expected: if job.skips.has(Skip::BuildQuality) { rays } else { u64::MAX },
             cancel: &self.control.cancel,
             progress: Some(&|share| self.progress.report(share)),
         };
@@ -350,6 +353,7 @@ impl Run<'_> {
 /// How a file is read, as the flags have it.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading<'a> {
+    pub skips: Skips,
     pub reader: Reader,
     /// See [`LoadOptions::exact`].
     pub exact: bool,
@@ -369,6 +373,7 @@ pub fn load(
     let options = LoadOptions {
         reader: reading.reader,
         exact: reading.exact,
+        skips: reading.skips,
         smooth: reading.smooth,
         allow: reading.allow.to_vec(),
         overrides: reading.defines.iter().map(|d| Override::from(d.as_str())).collect(),
@@ -458,6 +463,9 @@ fn merge(all: &mut RenderStats, one: &RenderStats, index: u32) {
     all.shadow_rays_faint += one.shadow_rays_faint;
     all.rays_inside += one.rays_inside;
     all.branches_below_cut += one.branches_below_cut;
+    all.work.add(&one.work);
+    all.packets_outside += one.packets_outside;
+    all.blocks_without_highlight += one.blocks_without_highlight;
 }
 
 /// Of frame number `index` and those before it.

@@ -6,13 +6,14 @@ use super::message::Messages;
 use super::plan::Plan;
 use super::render::{Done, Ready};
 use super::settings::Settings;
+use super::skipped::{self, Skipped, skipped};
 use super::style::{bytes, counted, grouped, seconds};
 use super::target::Target;
 use super::{output, stats, system};
 use tison::backend::AnyBackend;
 use tison::film;
 use tison::render::{Adapted, Ended, RenderStats, Stop};
-use tison::scene::{CameraDesc, Projection, SceneCounts, Unused};
+use tison::scene::{CameraDesc, Projection, Reflect, SceneCounts, Unused};
 
 /// The story of a run.
 #[derive(Debug)]
@@ -23,6 +24,10 @@ pub struct Report<'a> {
     /// Name of what a scene may need, and whether this one does.
     pub needs: Vec<(&'static str, bool)>,
     pub unused: Unused,
+    /// Materials that mirror by Fresnel's equations between equal indices: nothing.
+    pub fresnel: usize,
+    /// Whether the first hierarchy was built quickly.
+    pub quick: bool,
     pub scene_bytes: u64,
     pub backend_bytes: u64,
     /// Release, packet width, build quality.
@@ -43,6 +48,8 @@ impl<'a> Report<'a> {
             counts: scene.counts(),
             needs: scene.needs().list().to_vec(),
             unused: ready.loaded.unused,
+            fresnel: scene.materials.iter().filter(|m| m.reflect == Reflect::Fresnel && !m.reflects()).count(),
+            quick: backends.first().is_some_and(AnyBackend::is_quick),
             scene_bytes: scene.bytes() as u64,
             backend_bytes: backends.iter().map(AnyBackend::bytes).sum(),
             details: backends.iter().map(AnyBackend::details).collect::<Vec<_>>().join(" and "),
@@ -228,13 +235,14 @@ impl<'a> Report<'a> {
     }
 
     fn skipped_line(&self) -> Option<String> {
-        let parts: Vec<String> = stats::skipped(self)
+        let parts: Vec<String> = skipped(self)
             .into_iter()
+            .filter(|(name, _)| self.plan.verbose || !skipped::is_detail(name))
             .map(|(name, why)| {
                 let name = name.replace('_', " ");
                 match why {
-                    stats::Skipped::Count(n) => format!("{name}: {}", grouped(n)),
-                    stats::Skipped::Because(why) => format!("{name} ({why})"),
+                    Skipped::Count(n) => format!("{name}: {}", grouped(n)),
+                    Skipped::Because(why) => format!("{name} ({why})"),
                 }
             })
             .collect();

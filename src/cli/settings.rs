@@ -119,6 +119,7 @@ impl Settings {
             jitter_radius,
             light_samples,
             aovs: plan.aovs.clone(),
+            skips: plan.skips,
         };
         let display = Display { tonemap, exposure, depth_range: None };
         let settings = Self { job, pixel: frame.pixel, display, scene_size: render.size, list: all.list };

@@ -3,72 +3,10 @@
 use super::EMBREE;
 use super::both::Comparison;
 use super::report::Report;
+use super::skipped::{Skipped, skipped};
 use serde_json::{Map, Value, json};
 use tison::render::{Adapted, Ended};
 use tison::scene::SceneCounts;
-
-/// Why something was not done.
-#[derive(Debug, PartialEq)]
-pub enum Skipped {
-    /// That often.
-    Count(u64),
-    /// At all.
-    Because(&'static str),
-}
-
-/// What was left out, by name.
-pub fn skipped(report: &Report<'_>) -> Vec<(&'static str, Skipped)> {
-    let unneeded = report.needs.iter().filter(|(_, needed)| !needed).map(|&(name, _)| {
-        let why = match name {
-            "reflection" => "no material mirrors",
-            "refraction" => "no material refracts",
-            "specular" => "no material has a highlight",
-            "smooth_normals" => "no mesh has normals",
-            "textures" => "no material has an image",
-            "area_lights" => "no light has a size",
-            "absorption" => "no material absorbs",
-            "shadow_rays" => "no light changes any material",
-            _ => "not needed",
-        };
-        (name, Skipped::Because(why))
-    });
-    let unused = &report.unused;
-    let counts = [
-        ("unused_materials", unused.materials as u64),
-        ("unused_textures", unused.textures as u64),
-        ("lights_without_power", unused.lights as u64),
-        ("shadow_rays_facing_away", report.done.stats.shadow_rays_facing_away),
-        ("shadow_rays_enclosed", report.done.stats.shadow_rays_enclosed),
-        ("shadow_rays_faint", report.done.stats.shadow_rays_faint),
-        ("traversals_inside_shapes", report.done.stats.rays_inside),
-        ("branches_below_cut", report.done.stats.branches_below_cut),
-        ("pixels_that_need_no_more", report.done.stats.adapted.map_or(0, |a| a.stopped_early)),
-    ];
-    let counts = counts.into_iter().filter(|&(_, n)| n > 0).map(|(name, n)| (name, Skipped::Count(n)));
-    unneeded.chain(not_drawn(report)).chain(kinds_without(&report.counts)).chain(counts).collect()
-}
-
-/// Random numbers that no ray needs.
-fn not_drawn(report: &Report<'_>) -> impl Iterator<Item = (&'static str, Skipped)> {
-    let job = &report.settings.job;
-    let jitter = match (job.spp, job.jitter_radius) {
-        (1, _) => Some("one sample a pixel"),
-        (_, 0.0) => Some("all samples go through the pixel's centre"),
-        _ => None,
-    };
-    let lens = (report.camera.aperture == 0.0).then_some("no lens: pinhole");
-    let parts = [("lens", lens), ("pixel_jitter", jitter)];
-    parts.into_iter().filter_map(|(name, why)| Some((name, Skipped::Because(why?))))
-}
-
-/// What no ray is tested against.
-fn kinds_without(c: &SceneCounts) -> impl Iterator<Item = (&'static str, Skipped)> + use<> {
-    let parts = [
-        ("user_geometry", c.spheres + c.cubes + c.cylinders + c.quads, "no analytic shapes"),
-        ("meshes", c.triangles, "no meshes"),
-    ];
-    parts.into_iter().filter(|&(_, n, _)| n == 0).map(|(name, _, why)| (name, Skipped::Because(why)))
-}
 
 /// Counts under the names that `info --json` uses too.
 pub fn scene_json(c: &SceneCounts) -> Value {

@@ -14,5 +14,6 @@ pub use pow::pow01;
 pub use random::Random;
 pub(crate) use sampling::hash;
 pub use sampling::{
-    Branch, PixelSamples, Sampler, Sampling, SobolLanes, concentric_disc, polar_disc, rejection_disc, uniform_radius_disc,
+    Branch, PixelSamples, Sampler, Sampling, SobolLanes, concentric_disc, polar_disc, rejection_disc,
+    uniform_radius_disc,
 };

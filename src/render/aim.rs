@@ -10,7 +10,7 @@ use crate::simd::{self, Kernel};
 use glam::DVec3;
 
 /// End of a shadow ray that was sent at a light: just short of it.
-const BEFORE_THE_LIGHT: f32 = 1.0 - 4.0 * 0.5 * f32::EPSILON;
+pub const BEFORE_THE_LIGHT: f32 = 1.0 - 4.0 * 0.5 * f32::EPSILON;
 
 /// What a light would add to the lanes of a block if nothing were in the way, before the weight.
 #[repr(align(64))]
@@ -32,6 +32,8 @@ pub struct Rules {
     pub faint: f32,
     /// Whether the light stands outside of every closed shape, so that from the inside of one it is hidden.
     pub outside: bool,
+    /// Whether highlights are computed even where there are none.
+    pub power: bool,
 }
 
 impl Rules {
@@ -65,8 +67,7 @@ pub fn at_center(
     shine: &mut Shine,
 ) -> Asked {
     let view = &lights::view(block, seen_from);
-    // Nothing shines here: no power to take.
-    match (lights::shines(block), light.falloff.is_some()) {
+    match (rules.power || lights::shines(block), light.falloff.is_some()) {
         (false, false) => simd::run(AtCenter::<false, false> { block, light, view, rules, packet, shine }),
         (false, true) => simd::run(AtCenter::<false, true> { block, light, view, rules, packet, shine }),
         (true, false) => simd::run(AtCenter::<true, false> { block, light, view, rules, packet, shine }),
@@ -183,7 +184,7 @@ mod tests {
     use super::*;
     use glam::Vec3;
 
-    const ALL: Rules = Rules { faint: 0.0, outside: true };
+    const ALL: Rules = Rules { faint: 0.0, outside: true, power: false };
 
     /// A point at the origin that faces +y, in lane 0.
     fn block() -> Block {

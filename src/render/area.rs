@@ -24,7 +24,7 @@ impl Area {
     /// Forgets what it was and becomes `tile`, without samples.
     pub fn become_tile(&mut self, tile: Crop, job: &Job, twice: Option<&Twice>) {
         tile::pixels(tile, &mut self.pixels.at);
-        self.pixels.start(!job.aovs.is_empty());
+        self.pixels.start(job.gathers_hits());
         self.twice.clear();
         self.again.clear();
         if let Some(twice) = twice {

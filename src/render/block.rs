@@ -20,6 +20,15 @@ pub type F64 = [f64; LANES];
 /// Half an f32 ulp of 1.
 pub const EPS: f64 = 0.5 * f32::EPSILON as f64;
 
+/// The lanes whose bits are set.
+pub fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = bits.trailing_zeros();
+        bits &= bits.wrapping_sub(1);
+        (lane < u32::BITS).then_some(lane as usize)
+    })
+}
+
 /// Where a ray's colour goes and how much of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Path {

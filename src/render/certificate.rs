@@ -31,7 +31,8 @@ impl Radiance {
     /// The bounds for rays of `scene` that start with up to `k_max` bounces.
     #[must_use]
     pub fn of(scene: &Scene, needs: &Needs, k_max: u32) -> Self {
-        let lights: Option<Vec3> = scene.lights.iter().map(|l| strongest(scene, l)).sum();
+        let shining = scene.lights.iter().filter(|l| l.color != Vec3::ZERO);
+        let lights: Option<Vec3> = shining.map(|l| strongest(scene, l)).sum();
         let background = scene.background.max_element();
         let (mut local, mut rho) = (0f32, 0f32);
         for m in &scene.materials {

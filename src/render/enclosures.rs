@@ -30,13 +30,14 @@ pub struct Enclosures {
 }
 
 impl Enclosures {
-    /// Those of `scene` for some of its lights; which shapes are solitary matters only where rays get inside.
+    /// Those of `scene` for some of its lights; which shapes are solitary matters only where rays get inside. What is
+    /// not asked about is taken to be otherwise.
     #[must_use]
-    pub fn of(scene: &Scene, lights: &[Light], rays_inside: bool) -> Self {
-        let outside =
-            |light: &Light| !scene.objects.iter().filter_map(closed).flat_map(boxes).any(|b| is_near(&b, light));
+    pub fn of(scene: &Scene, lights: &[Light], lights_outside: bool, rays_inside: bool) -> Self {
+        let inside =
+            |light: &Light| scene.objects.iter().filter_map(closed).flat_map(boxes).any(|b| is_near(&b, light));
         Self {
-            outside: lights.iter().map(outside).collect(),
+            outside: lights.iter().map(|light| lights_outside && !inside(light)).collect(),
             solitary: if rays_inside { solitary(scene) } else { Vec::new() },
         }
     }
@@ -135,7 +136,7 @@ mod tests {
     }
 
     fn of(scene: &Scene, lights: &[Light]) -> Enclosures {
-        Enclosures::of(scene, lights, true)
+        Enclosures::of(scene, lights, true, true)
     }
 
     #[test]
@@ -143,7 +144,7 @@ mod tests {
         let scene = balls(&[(0.0, 1.0), (5.0, 1.0), (6.9, 1.0), (9.0, 1.0), (11.0, 1.0)]);
         let found: Vec<_> = (0..5).map(|prim| of(&scene, &[]).is_solitary([0, prim])).collect();
         assert_eq!(found, [true, false, false, false, false], "the last two touch in a point");
-        assert!(!of(&scene, &[]).is_solitary([7, 0]) && !Enclosures::of(&scene, &[], false).is_solitary([0, 0]));
+        assert!(!of(&scene, &[]).is_solitary([7, 0]) && !Enclosures::of(&scene, &[], true, false).is_solitary([0, 0]));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use super::surface::SurfacePoint;
 use super::tile::Segment;
 use crate::backend::{AnyBackend, Backend};
 use crate::geom::{Coherence, Hit, LANES, PacketBatch, Ray, RayPacket};
-use crate::scene::{CameraDesc, Scene};
+use crate::scene::{CameraDesc, Needs, Scene};
 use glam::{DVec3, Vec3};
 use std::fmt::Write;
 
@@ -53,6 +53,7 @@ struct Told<'a> {
     seen_from: Option<DVec3>,
     clip: Option<(f64, f64)>,
     known: Known,
+    needs: Needs,
     media: Media,
     out: String,
 }
@@ -71,11 +72,13 @@ impl<B: Backend> Teller<'_, B> {
         let segment = Segment { pixels: &[(x, y)], first: 0, samples: 1, sampling: &sampling };
         segment.camera_rays(&camera, self.job, &mut batch);
         let ray = batch.packets()[0].ray.get(0);
+        let needs = self.scene.needs();
         let mut told = Told {
             segment,
             seen_from: self.scene.course_rules.then_some(camera.eye),
             clip: camera.clip,
-            known: Known::of(self.scene, &self.scene.needs(), self.job.k_max),
+            known: Known::of(self.scene, &camera, self.job, &needs),
+            needs,
             media: Media::new(),
             out: String::new(),
         };
@@ -158,7 +161,7 @@ impl<B: Backend> Teller<'_, B> {
     fn light(&self, index: usize, block: &mut Block, indent: &str, told: &mut Told<'_>) -> Vec3 {
         let light = &told.known.lights[index];
         let faint = Rules::FAINT_SHARE * self.job.min_weight;
-        let rules = Rules { faint, outside: told.known.enclosures.is_outside(index) };
+        let rules = Rules { faint, outside: told.known.enclosures.is_outside(index), power: false };
         let (mut batch, mut shine) = (PacketBatch::<RayPacket>::default(), Shine::NONE);
         let asked = aim::at_center(block, light, told.seen_from, rules, batch.push_packet(), &mut shine);
         let rounds = if light.radius > 0.0 { self.job.light_samples.max(1) } else { 1 };
@@ -182,7 +185,8 @@ impl<B: Backend> Teller<'_, B> {
         }
         block.color = [[0.0; LANES]; 3];
         let to_light = lights::to_center(block, light);
-        lights::add(block, light, Lit { visible: &[visible; LANES], to_light: &to_light, seen_from: told.seen_from });
+        let (lanes, shines) = (&[visible; LANES], lights::shines(block));
+        lights::add(block, light, Lit { visible: lanes, to_light: &to_light, seen_from: told.seen_from }, shines);
         let lit = Block::vec3(&block.weight, 0) * Block::vec3(&block.color, 0);
         let part = if visible < 1.0 { format!(" ({:.0} % of it visible)", 100.0 * visible) } else { String::new() };
         told.out += &format!("{indent}  light {index}: {}{part}\n", rgb(lit));
@@ -191,7 +195,7 @@ impl<B: Backend> Teller<'_, B> {
 
     fn branches(&self, path: &Path, block: &Block, stack: &mut Vec<Pending>, told: &mut Told<'_>, indent: &str) {
         let m = &self.scene.materials[block.material[0] as usize];
-        if !(m.reflects() || m.refracts()) {
+        if !told.needs.may_branch(m) {
             return;
         }
         let mut onwards = Onwards::default();

@@ -29,6 +29,12 @@ pub struct Facets<'a> {
     prim: [u32; LANES],
     /// Of each object; `None` for shapes.
     meshes: Vec<Option<Buffers<'a>>>,
+    /// Blocks whose normals were interpolated.
+    pub smooth_blocks: u64,
+    /// Go through the normals of corners even where no lane has any.
+    always_smooth: bool,
+    /// Whether the lanes to be finished have none to go through.
+    flat: bool,
 }
 
 /// Where everything about the triangles of an object is: nothing has to be followed for it.
@@ -95,7 +101,16 @@ impl<'a> Facets<'a> {
             geom: [0; LANES],
             prim: [0; LANES],
             meshes,
+            smooth_blocks: 0,
+            always_smooth: false,
+            flat: true,
         }
+    }
+
+    /// The same without the short way for facets that are flat.
+    #[must_use]
+    pub fn always_smooth(self) -> Self {
+        Self { always_smooth: true, ..self }
     }
 
     /// Looks up what belongs to the hits of the first `len` lanes: first where everything
@@ -205,6 +220,8 @@ impl Hits for Facets<'_> {
         block.len = len;
         block.enclosed = [false; LANES];
         self.gather(block, palette);
+        self.flat = !self.smooth.contains(&true) && !self.always_smooth;
+        self.smooth_blocks += u64::from(!self.flat);
         simd::run(Finish { facets: self, block });
         palette.add_texels(scene, block, |_, lane| self.uv(lane));
     }
@@ -298,7 +315,7 @@ fn refine(f: &Facets<'_>, out: &mut Points, weights: &mut [F64; 3]) {
 /// Source of the lift: J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, ch. 4.
 #[inline(always)]
 fn shading_normals(f: &Facets<'_>, out: &mut Points, weights: &[F64; 3]) {
-    if !f.smooth.contains(&true) {
+    if f.flat {
         out.ns = out.ng;
         out.lifted = out.p;
         return;

@@ -3,8 +3,8 @@
 use super::adapt;
 use crate::film::{Aov, Film};
 use crate::math::{Filter, Sampler, Sampling};
-use crate::scene::Camera;
 use crate::scene::desc::LensSampler;
+use crate::scene::{Camera, Skip, Skips};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
@@ -55,6 +55,8 @@ pub struct Job {
     pub light_samples: u32,
     /// Auxiliary images to fill.
     pub aovs: Vec<Aov>,
+    /// What is left out where nothing needs it.
+    pub skips: Skips,
 }
 
 impl Job {
@@ -78,7 +80,27 @@ impl Job {
             jitter_radius: 0.5,
             light_samples: 1,
             aovs: Vec::new(),
+            skips: Skips::ALL,
         }
+    }
+
+    /// The job that it comes to where a bounded skip is switched off.
+    #[must_use]
+    pub fn settled(&self) -> Self {
+        let mut job = self.clone();
+        if !job.skips.has(Skip::WeightCut) {
+            job.min_weight = 0.0;
+        }
+        if !job.skips.has(Skip::Converged) && matches!(job.stop, Stop::Noise(_)) {
+            job.stop = Stop::Count;
+        }
+        job
+    }
+
+    /// Whether what auxiliary images show is gathered.
+    #[must_use]
+    pub fn gathers_hits(&self) -> bool {
+        !self.aovs.is_empty() || !self.skips.has(Skip::Aovs)
     }
 
     /// Where `u` in `[0, 1)` is from a pixel's centre, across or down, in pixels.
@@ -188,6 +210,41 @@ impl RayCounts {
     }
 }
 
+/// What was done that a scene may not need.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Points drawn in pixels, for camera rays.
+    pub pixel_points: u64,
+    /// Points drawn on the lens.
+    pub lens_points: u64,
+    /// Blocks of up to sixteen hits whose corner normals were interpolated.
+    pub smooth_blocks: u64,
+    /// Blocks whose highlights were computed, once for each light.
+    pub highlights: u64,
+    /// Shadow rays that asked for the nearest hit.
+    pub nearest_occluders: u64,
+    /// Hits that went through the stage of secondary rays.
+    pub hits_asked_on: u64,
+    /// Hits that were kept for auxiliary images.
+    pub hits_kept: u64,
+    /// Rays whose hits were sorted into those of shapes and of meshes.
+    pub hits_sorted: u64,
+}
+
+impl Work {
+    /// Adds what another thread or frame did.
+    pub fn add(&mut self, o: &Self) {
+        self.pixel_points += o.pixel_points;
+        self.lens_points += o.lens_points;
+        self.smooth_blocks += o.smooth_blocks;
+        self.highlights += o.highlights;
+        self.nearest_occluders += o.nearest_occluders;
+        self.hits_asked_on += o.hits_asked_on;
+        self.hits_kept += o.hits_kept;
+        self.hits_sorted += o.hits_sorted;
+    }
+}
+
 /// What a render did, what it left out, and how wrong that can have made it.
 #[derive(Clone, Debug, Default)]
 pub struct RenderStats {
@@ -222,6 +279,12 @@ pub struct RenderStats {
     pub rays_inside: u64,
     /// Branches below the weight cut.
     pub branches_below_cut: u64,
+    /// What was done that can be left out.
+    pub work: Work,
+    /// Packets of camera rays that missed the box around the scene.
+    pub packets_outside: u64,
+    /// Blocks of up to sixteen hits that a light shone on without a highlight.
+    pub blocks_without_highlight: u64,
 }
 
 /// How an adaptive render went.

@@ -27,11 +27,10 @@ pub fn unoccluded(packet: &RayPacket) -> F32 {
     packet.t_far.map(|t| if t != f32::NEG_INFINITY { 1.0 } else { 0.0 })
 }
 
-/// Adds the light to the lanes of `block` as far as it is visible from there.
-pub fn add(block: &mut Block, light: &Light, lit: Lit<'_>) {
+/// Adds the light to the lanes of `block` as far as it is visible from there, highlights only if it `shines`.
+pub fn add(block: &mut Block, light: &Light, lit: Lit<'_>, shines: bool) {
     let view = &view(block, lit.seen_from);
-    // Nothing shines here: no power to take.
-    match (shines(block), light.falloff.is_some()) {
+    match (shines, light.falloff.is_some()) {
         (false, false) => simd::run(Add::<false, false> { block, light, lit, view }),
         (false, true) => simd::run(Add::<false, true> { block, light, lit, view }),
         (true, false) => simd::run(Add::<true, false> { block, light, lit, view }),
@@ -39,7 +38,7 @@ pub fn add(block: &mut Block, light: &Light, lit: Lit<'_>) {
     }
 }
 
-/// Whether a lane has a highlight.
+/// Whether any lane of `block` has a highlight: if not, there is no power to take.
 #[inline]
 #[must_use]
 pub fn shines(block: &Block) -> bool {
@@ -188,7 +187,8 @@ mod tests {
     fn shine(b: &mut Block, light: &Light, seen_from: Option<DVec3>) -> Vec3 {
         let before = Block::vec3(&b.color, 0);
         let to_light = to_center(b, light);
-        add(b, light, Lit { visible: &[1.0; LANES], to_light: &to_light, seen_from });
+        let shining = shines(b);
+        add(b, light, Lit { visible: &[1.0; LANES], to_light: &to_light, seen_from }, shining);
         Block::vec3(&b.color, 0) - before
     }
 
@@ -231,7 +231,10 @@ mod tests {
             let p = Block::dvec3(&points, 0) - light.position;
             assert!(p.length() <= 0.5 + 1e-12 && p.dot(light.position).abs() < 1e-12, "{p}");
             let mut packet = RayPacket::EMPTY;
-            assert_eq!((aim::at_points(&b, &points, 1, &mut packet), aim::at_points(&b, &points, 0, &mut packet)), (1, 0));
+            assert_eq!(
+                (aim::at_points(&b, &points, 1, &mut packet), aim::at_points(&b, &points, 0, &mut packet)),
+                (1, 0)
+            );
         }
     }
 }

@@ -17,6 +17,7 @@ mod media;
 pub mod optics;
 pub(crate) mod paint;
 mod pixel;
+mod reach;
 mod rounds;
 mod shade;
 mod shadows;
@@ -28,14 +29,14 @@ mod wave;
 mod worker;
 
 pub use explain::explain_pixel;
-pub use job::{Adapted, Control, Crop, Ended, Job, Outcome, RayCounts, RenderStats, Stop};
+pub use job::{Adapted, Control, Crop, Ended, Job, Outcome, RayCounts, RenderStats, Stop, Work};
 pub use surface::SurfacePoint;
 pub use surfaces::Surfaces;
 
 use crate::backend::{AnyBackend, Backend};
 use crate::film::{Aov, Film};
 use crate::math::{Sampler, Sampling};
-use crate::scene::{Camera, CameraDesc, Needs, Scene};
+use crate::scene::{Camera, CameraDesc, Needs, Scene, Skip};
 use adapt::Progress;
 use area::Area;
 use estimate::{ErrorSum, Twice};
@@ -88,14 +89,15 @@ pub fn run_with<B: Backend>(
     job: &Job,
     control: &Control,
 ) -> Result<Outcome, String> {
+    let job = &job.settled();
     let camera = camera.prepare(&scene.frame, job.size)?;
     if job.is_adaptive() && job.sampler == Sampler::Stratified {
         return Err("stratified samples are spread as a whole: how many there are must be known before".into());
     }
-    let needs = scene.needs();
+    let needs = Needs::of(scene, job.skips);
     let sampling = job.sampling(&camera);
     let twice = (job.is_adaptive() || (job.estimate && job.spp > 1)).then(|| Twice::of(job.crop, job.seed));
-    let outcome = if needs.secondary_rays() {
+    let outcome = if needs.secondary_rays() || !job.skips.has(Skip::Secondary) {
         Render::<B, true> { scene, camera, backend, job, control, needs, sampling, twice }.run()
     } else {
         Render::<B, false> { scene, camera, backend, job, control, needs, sampling, twice }.run()
@@ -143,7 +145,7 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
         let common = Common {
             started: Instant::now(),
             tiles: tile::tiles(self.job.crop),
-            known: Known::of(self.scene, &self.needs, self.job.k_max),
+            known: Known::of(self.scene, &self.camera, self.job, &self.needs),
         };
         match self.twice {
             Some(twice) if self.job.is_adaptive() => Rounds::new(self, &common, twice).run(),
@@ -156,7 +158,7 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
         let sum = Mutex::new(self.nothing(common));
         let next = AtomicUsize::new(0);
         rayon::broadcast(|_| {
-            let mut worker = TileWorker::new(self, &common.known);
+            let mut worker = TileWorker::new(self, common);
             let mut area = Area::default();
             while !self.control.is_cancelled() {
                 let index = next.fetch_add(1, Relaxed);
@@ -210,6 +212,9 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
             shadow_rays_faint: sum.tally.faint,
             rays_inside: sum.tally.inside,
             branches_below_cut: sum.tally.below_cut,
+            work: sum.tally.work,
+            packets_outside: sum.tally.packets_outside,
+            blocks_without_highlight: sum.tally.dull,
         };
         Outcome { film: sum.film, stats }
     }
@@ -226,6 +231,9 @@ impl Tally {
         self.faint += o.faint;
         self.inside += o.inside;
         self.below_cut += o.below_cut;
+        self.work.add(&o.work);
+        self.packets_outside += o.packets_outside;
+        self.dull += o.dull;
         self.again += o.again;
         self.brightest = self.brightest.max(o.brightest);
     }

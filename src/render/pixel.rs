@@ -33,6 +33,9 @@ impl PixelSum {
     #[must_use]
     pub fn mean(&self) -> DVec3 {
         let n = f64::from(self.counted.max(1));
+        if n == 1.0 && self.lack == 0.0 {
+            return self.color; // a lone sample needs no division
+        }
         if self.lack == 0.0 { self.color / n } else { (self.color + self.plain * (self.lack / n)) / n }
     }
 
@@ -49,6 +52,13 @@ impl PixelSum {
     /// Adds samples, at most a packet's worth, in their order.
     pub fn add(&mut self, samples: &[DVec3], deviations: bool) {
         self.taken += samples.len() as u32;
+        if !deviations {
+            for color in samples.iter().filter_map(|s| kept(*s)) {
+                self.color += color;
+                self.counted += 1;
+            }
+            return;
+        }
         let before = *self;
         let (mut colors, mut count) = ([DVec3::ZERO; LANES], 0);
         for color in samples.iter().filter_map(|s| kept(*s)) {
@@ -57,9 +67,7 @@ impl PixelSum {
             count += 1;
         }
         self.counted += count as u32;
-        if deviations {
-            self.deviate(&before, colors[..count].iter().copied());
-        }
+        self.deviate(&before, colors[..count].iter().copied());
     }
 
     /// Adds samples that count as much as their weights say.

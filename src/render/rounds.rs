@@ -87,7 +87,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Rounds<'a, B, SECONDARY> {
         let next = AtomicUsize::new(0);
         let first = self.samples.load(Relaxed) == 0;
         rayon::broadcast(|_| {
-            let mut worker = TileWorker::new(self.render, &self.common.known);
+            let mut worker = TileWorker::new(self.render, self.common);
             while !self.render.control.is_cancelled() && (first || !self.is_out_of_time()) {
                 let Some(area) = self.areas.get(next.fetch_add(1, Relaxed)) else { break };
                 let mut area = lock(area);

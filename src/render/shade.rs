@@ -120,6 +120,8 @@ impl Onwards {
         let (mut reflect, refract) = match material.reflect {
             Reflect::Constant(weight) => (weight, material.refract),
             Reflect::Metal(color) => (color + (Vec3::ONE - color) * optics::schlick(cos_i) as f32, material.refract),
+            // The equations say the same, but for 0 / 0 where the ray grazes.
+            Reflect::Fresnel if self.eta[lane] == 1.0 => (Vec3::ZERO, material.refract),
             Reflect::Fresnel => {
                 let f = if passes { optics::reflectance(cos_i, turns.cos_t[lane], self.eta[lane]) as f32 } else { 1.0 };
                 (Vec3::splat(f), material.refract * (1.0 - f))
@@ -302,6 +304,15 @@ mod tests {
             assert!((r.d - DVec3::new(x, y, 0.0).as_vec3()).length() < 1e-7);
             assert!((f64::from(t.d.x) - x / 1.5).abs() < 1e-7 && t.d.y < 0.0);
             assert!(t.inwards && !r.inwards);
+        }
+    }
+
+    #[test]
+    fn equal_indices_mirror_nothing_at_any_angle() {
+        let same = Material { ior: 1.0, ..glass(Reflect::Fresnel) };
+        for (x, y) in [(0.0, 1.0), (0.8, 0.6), (1.0, 0.0)] {
+            let (r, t) = branches(same.clone(), DVec3::Y, DVec3::new(x, -y, 0.0), true);
+            assert!(r.is_none() && t.expect("it passes").weight == same.refract, "{x} {y}");
         }
     }
 

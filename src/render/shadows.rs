@@ -1,11 +1,13 @@
 //! Shadow rays of many blocks on their way to one light.
 
-use super::aim::Shine;
-use super::block::{Block, F32};
+use super::aim::{BEFORE_THE_LIGHT, Shine};
+use super::block::{Block, F32, lanes};
 use super::lights::unoccluded;
 use crate::backend::Backend;
-use crate::geom::{Coherence, LANES, PacketBatch, RayPacket};
+use crate::geom::{Coherence, INVALID_ID, LANES, PacketBatch, RayHitPacket, RayPacket};
 use crate::simd::{self, Kernel};
+
+const ALL_LANES: u32 = (1 << LANES) - 1;
 
 /// A batch of them, and whose they are.
 ///
@@ -18,14 +20,35 @@ pub struct Shadows<const DENSE: bool> {
     owners: Vec<u32>,
     aimed: Box<RayPacket>,
     visible: Vec<F32>,
+    /// The lanes of each block whose answers count.
+    needed: Vec<u32>,
+    how: How,
+    /// Rays that asked for the nearest hit.
+    pub nearest: u64,
+}
+
+/// How rays are asked about that need not be asked so.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct How {
+    /// Ask for the nearest hit, though any would do.
+    pub nearest: bool,
+    /// Send the rays of all lanes, though the answers of some do not count.
+    pub all: bool,
 }
 
 impl<const DENSE: bool> Shadows<DENSE> {
     /// None yet.
     #[must_use]
-    pub fn new() -> Self {
-        let aimed = Box::new(RayPacket::EMPTY);
-        Self { batch: PacketBatch::default(), owners: Vec::new(), aimed, visible: Vec::new() }
+    pub fn new(how: How) -> Self {
+        Self {
+            batch: PacketBatch::default(),
+            owners: Vec::new(),
+            aimed: Box::new(RayPacket::EMPTY),
+            visible: Vec::new(),
+            needed: Vec::new(),
+            how,
+            nearest: 0,
+        }
     }
 
     /// Forgets all, and makes room for the answers of `blocks`.
@@ -34,34 +57,42 @@ impl<const DENSE: bool> Shadows<DENSE> {
         self.owners.clear();
         self.visible.clear();
         self.visible.resize(blocks, [0.0; LANES]);
+        self.needed.clear();
+        self.needed.resize(blocks, 0);
     }
 
-    /// A packet to be filled with the rays of block `index` by `aim`, which tells the lanes that hold one; those
-    /// of the others have ended at minus infinity.
+    /// A packet to be filled with the rays of a block, which is number `index` and has `len` lanes, by `aim`: it tells the
+    /// lanes that need one, and ends those of the others at minus infinity. Returns what `aim` tells, and the lanes whose
+    /// rays are sent.
     #[inline]
-    pub fn push<A>(&mut self, index: usize, aim: impl FnOnce(&mut RayPacket) -> (A, u32)) -> A {
-        if DENSE {
-            let (asked, mut lanes) = aim(&mut self.aimed);
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros();
-                self.batch.push(&self.aimed.get(lane as usize));
-                self.owners.push((index * LANES) as u32 + lane);
-                lanes &= lanes - 1;
-            }
-            return asked;
+    pub fn push<A>(&mut self, index: usize, len: usize, aim: impl FnOnce(&mut RayPacket) -> (A, u32)) -> (A, u32) {
+        let packet = if DENSE { &mut *self.aimed } else { self.batch.push_packet() };
+        let (told, mut sent) = aim(packet);
+        self.needed[index] = sent;
+        if self.how.all {
+            packet.t_far[..len].fill(BEFORE_THE_LIGHT);
+            sent = (1 << len) - 1;
         }
-        let (asked, lanes) = aim(self.batch.push_packet());
-        if lanes == 0 {
+        if DENSE {
+            for lane in lanes(sent) {
+                self.batch.push(&self.aimed.get(lane));
+                self.owners.push((index * LANES + lane) as u32);
+            }
+        } else if sent == 0 {
             self.batch.pop_packet();
         } else {
             self.owners.push(index as u32);
         }
-        asked
+        (told, sent)
     }
 
     /// Asks `backend` which of them get through.
     pub fn trace(&mut self, backend: &impl Backend) {
-        backend.occluded_many(&mut self.batch, Coherence::Coherent);
+        if self.how.nearest {
+            self.trace_nearest(backend);
+        } else {
+            backend.occluded_many(&mut self.batch, Coherence::Coherent);
+        }
         if DENSE {
             for (k, packet) in self.batch.packets().iter().enumerate() {
                 for (owner, through) in self.owners[k * LANES..].iter().zip(unoccluded(packet)) {
@@ -71,6 +102,25 @@ impl<const DENSE: bool> Shadows<DENSE> {
         } else {
             for (packet, &owner) in self.batch.packets().iter().zip(&self.owners) {
                 self.visible[owner as usize] = unoccluded(packet);
+            }
+        }
+        if self.how.all {
+            for (visible, &needed) in self.visible.iter_mut().zip(&self.needed) {
+                lanes(!needed & ALL_LANES).for_each(|lane| visible[lane] = 0.0);
+            }
+        }
+    }
+
+    /// Whether anything is in the way by what is nearest.
+    fn trace_nearest(&mut self, backend: &impl Backend) {
+        self.nearest += self.batch.len() as u64;
+        let mut batch = PacketBatch::<RayHitPacket>::default();
+        batch.resize(self.batch.len());
+        batch.packets_mut().zip(self.batch.packets()).for_each(|((to, _), from)| to.ray = from.clone());
+        backend.intersect_many(&mut batch, Coherence::Coherent);
+        for ((packet, _), found) in self.batch.packets_mut().zip(batch.packets()) {
+            for (t_far, &geom) in packet.t_far.iter_mut().zip(&found.hit.geom_id) {
+                *t_far = if geom == INVALID_ID { *t_far } else { f32::NEG_INFINITY };
             }
         }
     }

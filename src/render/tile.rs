@@ -2,9 +2,11 @@
 
 use super::job::{Crop, Job};
 use crate::geom::{LANES, PacketBatch, RayHitPacket};
-use crate::math::{PixelSamples, Sampling, SobolLanes, concentric_disc, polar_disc, rejection_disc, uniform_radius_disc};
+use crate::math::{
+    PixelSamples, Sampling, SobolLanes, concentric_disc, polar_disc, rejection_disc, uniform_radius_disc,
+};
 use crate::scene::desc::LensSampler;
-use crate::scene::{Camera, CameraRays};
+use crate::scene::{Camera, CameraRays, Skip};
 use crate::simd::{self, Kernel};
 use glam::DVec2;
 use std::ops::Range;
@@ -111,12 +113,13 @@ impl<'a> Segment<'a> {
         job.filter.weight(job.offset(a), job.offset(b))
     }
 
-    /// Fills `batch` with the camera rays.
-    pub fn camera_rays(&self, camera: &Camera, job: &Job, batch: &mut PacketBatch<RayHitPacket>) {
+    /// Fills `batch` with the camera rays; what was drawn for each.
+    pub fn camera_rays(&self, camera: &Camera, job: &Job, batch: &mut PacketBatch<RayHitPacket>) -> Drawn {
         batch.resize(self.pixels.len() * self.samples as usize);
         let end = self.first + self.samples;
         let mut rays = self.pixels.iter().flat_map(|&pixel| (self.first..end).map(move |sample| (pixel, sample)));
-        let draw = Draw::of(self, camera, job);
+        let drawn = Drawn::of(camera, job);
+        let draw = Draw::of(self, drawn);
         let (mut asked, mut at, mut lens) = (Asked::default(), [[0.0; LANES]; 2], [[0.0; LANES]; 2]);
         for (packet, live) in batch.packets_mut() {
             for (lane, ((x, y), sample)) in rays.by_ref().take(live).enumerate() {
@@ -130,7 +133,7 @@ impl<'a> Segment<'a> {
                     at = [asked.x.map(|x| f64::from(x) + dx), asked.y.map(|y| f64::from(y) + dy)];
                 }
             }
-            if let (Some([_, _, u, v]), Some(_)) = (&points, &camera.lens) {
+            if let (Some([_, _, u, v]), true) = (&points, drawn.lens) {
                 for lane in 0..live {
                     let samples = self.sampling.pixel(asked.x[lane], asked.y[lane]);
                     let disc = on_lens(job.lens_sampler, samples, asked.sample[lane], [u[lane], v[lane]]);
@@ -139,6 +142,23 @@ impl<'a> Segment<'a> {
             }
             simd::run(CameraRays { camera, at: &at, lens: &lens, packet: &mut packet.ray });
         }
+        drawn
+    }
+}
+
+/// What is drawn for a camera ray.
+#[derive(Clone, Copy, Debug)]
+pub struct Drawn {
+    /// The sample's point.
+    pub pixel: bool,
+    /// A point of the lens from it.
+    pub lens: bool,
+}
+
+impl Drawn {
+    fn of(camera: &Camera, job: &Job) -> Self {
+        let lens = camera.lens.is_some() || !job.skips.has(Skip::Lens);
+        Self { pixel: job.spp > 1 || lens || !job.skips.has(Skip::Jitter), lens }
     }
 }
 
@@ -154,11 +174,11 @@ enum Draw {
 }
 
 impl Draw {
-    fn of(segment: &Segment<'_>, camera: &Camera, job: &Job) -> Self {
+    fn of(segment: &Segment<'_>, drawn: Drawn) -> Self {
         let end = segment.first + segment.samples;
-        let found = match (job.spp, camera.lens) {
-            (1, None) => return Self::None,
-            (_, None) => segment.sampling.lanes(end).map(Self::Pixel),
+        let found = match drawn {
+            Drawn { pixel: false, .. } => return Self::None,
+            Drawn { lens: false, .. } => segment.sampling.lanes(end).map(Self::Pixel),
             _ => segment.sampling.lanes(end).map(Self::All),
         };
         found.unwrap_or(Self::OneByOne)

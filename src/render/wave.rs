@@ -2,24 +2,25 @@
 //! without recursion.
 
 use super::aim::{self, Asked, Rules, Shine};
-use super::block::{Block, F32, Hits, Path};
+use super::block::{Block, F32, Hits, Path, lanes};
 use super::certificate::Bound;
 use super::enclosures::Enclosures;
 use super::facets::Facets;
-use super::job::{Job, RayCounts};
+use super::job::{Job, RayCounts, Work};
 use super::known::Known;
 use super::lights::{self, Lit};
 use super::media::{Media, Medium};
 use super::paint::Palette;
 use super::shade::{Branch, Onwards};
-use super::shadows::{Shadows, take};
+use super::shadows::{How, Shadows, take};
 use super::shapes::ShapeHits;
 use super::surface::SurfacePoint;
-use super::tile::Segment;
+use super::tile::{Drawn, Segment};
+use super::{Common, Render};
 use crate::backend::Backend;
 use crate::film::Aov;
 use crate::geom::{Coherence, INVALID_ID, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
-use crate::scene::{Camera, Needs, Object, Scene};
+use crate::scene::{Material, Object, Reflect, Scene, Skip};
 use glam::DVec3;
 
 /// Most secondary rays worked on at once; the rest waits, newest first, so that memory is
@@ -67,6 +68,12 @@ pub struct Tally {
     pub inside: u64,
     /// Branches below the weight cut.
     pub below_cut: u64,
+    /// What was done that can be left out.
+    pub work: Work,
+    /// Packets of camera rays that the backend was not asked about.
+    pub packets_outside: u64,
+    /// Blocks without a highlight, once for each light that shone on them.
+    pub dull: u64,
     /// Rays of all kinds that were sent to compare with, and are not counted above.
     pub again: u64,
     /// Largest answer of a surface to all lights; kept only where a bound needs it.
@@ -115,40 +122,44 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
 
 impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     /// An integrator with empty buffers.
-    pub fn new(
-        scene: &'a Scene,
-        camera: &Camera,
-        backend: &'a B,
-        job: &'a Job,
-        needs: &Needs,
-        known: &'a Known,
-    ) -> Self {
-        let cost = job.aovs.contains(&Aov::Cost).then(Vec::new);
-        let seen = job.aovs.iter().any(|&a| !matches!(a, Aov::Cost | Aov::Samples)).then(Vec::new);
+    pub fn new(render: &'a Render<'a, B, SECONDARY>, common: &'a Common) -> Self {
+        let Render { scene, camera, backend, job, needs, .. } = *render;
+        let skips = job.skips;
+        let always = !skips.has(Skip::Aovs);
+        let cost = always || job.aovs.contains(&Aov::Cost);
+        let seen = always || job.aovs.iter().any(|&a| !matches!(a, Aov::Cost | Aov::Samples));
         let is_shapes: Vec<bool> = scene.objects.iter().map(|o| matches!(o, Object::Shapes(_))).collect();
+        let both = !skips.has(Skip::Geometry);
+        let (meshes, shapes) = (both || is_shapes.contains(&false), both || is_shapes.contains(&true));
+        let facets = || {
+            let facets = Facets::new(scene);
+            Box::new(if skips.has(Skip::Normals) { facets } else { facets.always_smooth() })
+        };
+        let ask_fresnel = !skips.has(Skip::Fresnel);
+        let branches = |m: &Material| needs.may_branch(m) || (ask_fresnel && m.reflect == Reflect::Fresnel);
         Self {
             scene,
             backend,
             job,
-            known,
+            known: &common.known,
             seen_from: scene.course_rules.then_some(camera.eye),
             clip: camera.clip,
             palette: Palette::of(scene),
-            branching: scene.materials.iter().map(|m| m.reflects() || m.refracts()).collect(),
+            branching: scene.materials.iter().map(branches).collect(),
             absorbs: needs.absorption,
-            facets: is_shapes.contains(&false).then(|| Box::new(Facets::new(scene))),
-            shape_hits: is_shapes.contains(&true).then(Box::default),
-            is_mixed: is_shapes.contains(&false) && is_shapes.contains(&true),
+            facets: meshes.then(facets),
+            shape_hits: shapes.then(Box::default),
+            is_mixed: meshes && shapes,
             is_shapes,
             blocks: Vec::new(),
             used: 0,
-            shadows: Shadows::new(),
+            shadows: Shadows::new(How { nearest: !skips.has(Skip::AnyHit), all: !skips.has(Skip::ShadowRays) }),
             shines: Vec::new(),
             visible: Vec::new(),
             media: Media::new(),
             onwards: Onwards::default(),
             waiting: Vec::new(),
-            gathered: Gathered { cost, seen, ..Gathered::default() },
+            gathered: Gathered { cost: cost.then(Vec::new), seen: seen.then(Vec::new), ..Gathered::default() },
             tally: Tally::default(),
         }
     }
@@ -169,13 +180,17 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             cost.resize(samples, 1);
         }
         self.tally.rays.camera += samples as u64;
-        self.backend.intersect_many(batch, coherence);
+        match &self.known.reach {
+            Some(reach) => self.tally.packets_outside += reach.intersect_many(self.backend, batch, coherence),
+            None => self.backend.intersect_many(batch, coherence),
+        }
         if let Some(range) = self.clip {
             batch.packets_mut().for_each(|(packet, live)| clip(packet, live, range));
         }
         self.collect(batch, |i| Path::of_sample(i as u32));
         if let Some(seen) = &mut self.gathered.seen {
             seen.clear();
+            self.tally.work.hits_kept += self.blocks[..self.used].iter().map(|b| b.len as u64).sum::<u64>();
             for block in &self.blocks[..self.used] {
                 seen.extend((0..block.len).map(|lane| (block.slot[lane], SurfacePoint::of_lane(block, lane))));
             }
@@ -215,9 +230,12 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     /// Misses take the background, hits fill blocks.
     fn collect(&mut self, batch: &PacketBatch<RayHitPacket>, path: impl Fn(usize) -> Path) {
         self.used = 0;
+        self.tally.work.hits_sorted += if self.is_mixed { batch.len() as u64 } else { 0 };
         self.misses(batch, &path);
         if let Some(mut hits) = self.facets.take() {
+            let before = hits.smooth_blocks;
             self.fill_blocks(&mut *hits, batch, false, &path);
+            self.tally.work.smooth_blocks += hits.smooth_blocks - before;
             self.facets = Some(hits);
         }
         if let Some(mut hits) = self.shape_hits.take() {
@@ -345,14 +363,14 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         self.shines.resize(self.used.max(self.shines.len()), Shine::NONE);
         for i in 0..self.used {
             let (block, shine) = (&self.blocks[i], &mut self.shines[i]);
-            let asked = self.shadows.push(i, |packet| {
+            let (asked, sent) = self.shadows.push(i, block.len, |packet| {
                 let asked = aim::at_center(block, &light, self.seen_from, rules, packet, shine);
                 (asked, asked.sent)
             });
             self.note(i, asked, 1);
-            self.sent(i, asked.sent);
+            self.sent(i, sent);
         }
-        self.shadows.trace(self.backend);
+        self.trace_shadows();
         let lit = self.shines.iter().zip(self.shadows.visible());
         for (block, (shine, visible)) in self.blocks.iter_mut().zip(lit) {
             take(block, shine, visible);
@@ -363,7 +381,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     /// that got through.
     fn soft_light(&mut self, index: usize, segment: &Segment<'_>) {
         let (light, rules) = (self.known.lights[index], self.rules(index));
-        let rounds = self.job.light_samples.max(1);
+        let (rounds, all) = (self.job.light_samples.max(1), !self.job.skips.has(Skip::ShadowRays));
         let mut to_center = RayPacket::EMPTY;
         let mut wanted = Vec::with_capacity(self.used);
         self.shines.resize(self.used.max(self.shines.len()), Shine::NONE);
@@ -377,20 +395,18 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         self.visible.resize(self.used, [0.0; LANES]);
         for round in 0..rounds {
             self.shadows.start(self.used);
-            for (i, &wanted) in wanted.iter().enumerate().filter(|(_, wanted)| **wanted != 0) {
+            for (i, &wanted) in wanted.iter().enumerate().filter(|(_, wanted)| all || **wanted != 0) {
                 let block = &self.blocks[i];
                 let points = lights::points_on(block, &light, |lane| {
                     let (samples, sample) = segment.samples_of(block.slot[lane]);
                     let number = sample.wrapping_mul(rounds).wrapping_add(round);
                     samples.on_light(number, index as u32, block.branch[lane])
                 });
-                let sent = self.shadows.push(i, |packet| {
-                    let sent = aim::at_points(block, &points, wanted, packet);
-                    (sent, sent)
-                });
+                let ((), sent) =
+                    self.shadows.push(i, block.len, |packet| ((), aim::at_points(block, &points, wanted, packet)));
                 self.sent(i, sent);
             }
-            self.shadows.trace(self.backend);
+            self.trace_shadows();
             for (sum, through) in self.visible.iter_mut().zip(self.shadows.visible()) {
                 for lane in 0..LANES {
                     sum[lane] += through[lane];
@@ -403,22 +419,38 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
                 let visible = visible.map(|v| v * share);
                 let to_light = lights::to_center(block, &light);
                 let lit = Lit { visible: &visible, to_light: &to_light, seen_from: self.seen_from };
-                lights::add(block, &light, lit);
+                let shines = rules.power || lights::shines(block);
+                lights::add(block, &light, lit, shines);
             }
         }
     }
 
+    fn trace_shadows(&mut self) {
+        self.shadows.trace(self.backend);
+        self.tally.work.nearest_occluders += std::mem::take(&mut self.shadows.nearest);
+    }
+
     fn rules(&self, light: usize) -> Rules {
-        let faint = if SECONDARY { Rules::FAINT_SHARE * self.job.min_weight } else { 0.0 };
-        Rules { faint, outside: self.known.enclosures.is_outside(light) }
+        let cut = SECONDARY && self.job.skips.has(Skip::FaintLights);
+        Rules {
+            faint: if cut { Rules::FAINT_SHARE * self.job.min_weight } else { 0.0 },
+            outside: self.known.enclosures.is_outside(light),
+            power: !self.job.skips.has(Skip::Powf),
+        }
     }
 
     /// Counts the shadow rays that block `index` did not need, in each of `rounds`, and bounds what was left out.
     fn note(&mut self, index: usize, asked: Asked, rounds: u64) {
-        let count = |lanes: u32| rounds * u64::from(lanes.count_ones());
-        self.tally.facing_away += count(asked.facing_away);
-        self.tally.enclosed += count(asked.enclosed);
-        self.tally.faint += count(asked.faint);
+        let dull = !lights::shines(&self.blocks[index]);
+        let power = !dull || !self.job.skips.has(Skip::Powf);
+        self.tally.dull += u64::from(!power);
+        self.tally.work.highlights += u64::from(power);
+        if self.job.skips.has(Skip::ShadowRays) {
+            let count = |lanes: u32| rounds * u64::from(lanes.count_ones());
+            self.tally.facing_away += count(asked.facing_away);
+            self.tally.enclosed += count(asked.enclosed);
+            self.tally.faint += count(asked.faint);
+        }
         let (block, shine) = (&self.blocks[index], &self.shines[index]);
         for lane in lanes(asked.faint) {
             let most = Block::vec3(&block.weight, lane) * Block::vec3(&shine.add, lane);
@@ -438,6 +470,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     fn branch(&mut self) {
         let blocks = std::mem::take(&mut self.blocks);
         for block in &blocks[..self.used] {
+            self.tally.work.hits_asked_on += block.len as u64;
             let branches = |lane: &usize| self.branching[block.material[*lane] as usize];
             let lanes: u32 = (0..block.len).filter(branches).map(|lane| 1 << lane).sum();
             if lanes != 0 {
@@ -497,6 +530,14 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     }
 }
 
+impl Tally {
+    /// Counts what was drawn for so many camera rays.
+    pub fn note_drawn(&mut self, drawn: Drawn, rays: usize) {
+        self.work.pixel_points += if drawn.pixel { rays as u64 } else { 0 };
+        self.work.lens_points += if drawn.lens { rays as u64 } else { 0 };
+    }
+}
+
 impl Gathered {
     /// Notes that a branch of weight `most` was left out that could have brought `bound`.
     fn leave_out(&mut self, slot: u32, most: f32, bound: Bound) {
@@ -504,15 +545,6 @@ impl Gathered {
         cut[0] += f64::from(most) * f64::from(bound.fixed);
         cut[1] += f64::from(most) * f64::from(bound.scaled);
     }
-}
-
-/// The lanes whose bits are set.
-fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lane = bits.trailing_zeros();
-        bits &= bits.wrapping_sub(1);
-        (lane < u32::BITS).then_some(lane as usize)
-    })
 }
 
 /// Whether all lanes of a packet hold a hit; those without a ray may hold an old one.

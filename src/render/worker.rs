@@ -1,11 +1,10 @@
 //! One thread's part of a render: samples of pixels, by segments.
 
-use super::Render;
 use super::estimate::Twice;
-use super::known::Known;
 use super::pixel::{FirstHits, PixelSum};
 use super::tile::{self, Segment};
 use super::wave::{Tally, Waves};
+use super::{Common, Render};
 use crate::backend::Backend;
 use crate::geom::{Coherence, LANES, PacketBatch, RayHitPacket};
 use crate::math::Sampling;
@@ -69,8 +68,8 @@ pub struct TileWorker<'a, B, const SECONDARY: bool> {
 
 impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
     /// Empty buffers.
-    pub fn new(render: &'a Render<'a, B, SECONDARY>, known: &'a Known) -> Self {
-        let waves = Waves::new(render.scene, &render.camera, render.backend, render.job, &render.needs, known);
+    pub fn new(render: &'a Render<'a, B, SECONDARY>, common: &'a Common) -> Self {
+        let waves = Waves::new(render, common);
         Self { render, waves, batch: PacketBatch::default() }
     }
 
@@ -100,7 +99,8 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
                 return false;
             }
             let before = self.waves.tally.rays.total();
-            segment.camera_rays(&self.render.camera, self.render.job, &mut self.batch);
+            let drawn = segment.camera_rays(&self.render.camera, self.render.job, &mut self.batch);
+            self.waves.tally.note_drawn(drawn, self.batch.len());
             self.waves.trace(&mut self.batch, &segment, Coherence::Coherent);
             self.add_up(&mut sums[first_pixel..], &segment);
             if !hits.is_empty() {

@@ -5,7 +5,7 @@ use super::format::{Diagnostic, Override};
 use super::freeze::{self, Assets, MeshFile, Wanted};
 use super::obj::{Reader, Uv};
 use super::texture::Encoding;
-use super::{Error, FreeMemory, MeshFormat, MeshPaint, Object, Scene, Warning};
+use super::{Error, FreeMemory, MeshFormat, MeshPaint, Object, Scene, Skips, Warning};
 use glam::{DAffine3, Vec3};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -21,6 +21,8 @@ pub struct LoadOptions<'a> {
     /// ([`TriangleMesh::exact_triangle`](crate::geom::TriangleMesh::exact_triangle)), and texture coordinates
     /// that no image needs.
     pub exact: bool,
+    /// What is not read or not kept where nothing needs it.
+    pub skips: Skips,
     /// Folders besides the file's own that it may name files in.
     pub allow: Vec<PathBuf>,
     /// Keys of a scene file set from outside, in this order.
@@ -41,6 +43,7 @@ impl<'a> LoadOptions<'a> {
             reader: Reader::default(),
             smooth: None,
             exact: false,
+            skips: Skips::ALL,
             allow: Vec::new(),
             overrides: Vec::new(),
             cancel,

@@ -21,6 +21,7 @@ pub mod obj;
 mod object;
 mod parallel;
 pub mod ply;
+mod skip;
 pub mod smooth;
 mod source;
 mod texture;
@@ -35,6 +36,7 @@ pub use material::{Material, Reflect, Textured};
 pub use mesh_format::{MeshFormat, read_mesh};
 pub use needs::Needs;
 pub use object::{AnyShapes, Instance, Mesh, MeshData, MeshPaint, Object, Shapes};
+pub use skip::{Skip, Skips};
 pub use source::{FreeMemory, is_packed, unpacked_name};
 pub use texture::{Encoding, Texture};
 
@@ -193,6 +195,6 @@ impl Scene {
     /// What rendering it takes.
     #[must_use]
     pub fn needs(&self) -> Needs {
-        Needs::of(self)
+        Needs::of(self, Skips::ALL)
     }
 }

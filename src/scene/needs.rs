@@ -1,6 +1,6 @@
 //! What a scene uses, asked once when it is loaded: the render leaves out the rest.
 
-use super::Scene;
+use super::{Reflect, Scene, Skip, Skips};
 use glam::Vec3;
 
 /// What rendering this scene takes.
@@ -25,13 +25,14 @@ pub struct Needs {
 }
 
 impl Needs {
-    /// Asks the frozen scene.
+    /// Asks the frozen scene. What is switched off in `skips` is taken to be needed.
     #[must_use]
-    pub fn of(scene: &Scene) -> Self {
+    pub fn of(scene: &Scene, skips: Skips) -> Self {
         let any = |f: fn(&super::Material) -> bool| scene.materials.iter().any(f);
-        let lights = scene.lights.iter().any(|l| l.color != Vec3::ZERO);
+        let lights = scene.lights.iter().any(|l| l.color != Vec3::ZERO || !skips.has(Skip::DarkLights));
+        let fresnel = |m: &super::Material| !skips.has(Skip::Fresnel) && m.reflect == Reflect::Fresnel;
         Self {
-            reflection: any(super::Material::reflects),
+            reflection: scene.materials.iter().any(|m| m.reflects() || fresnel(m)),
             refraction: any(super::Material::refracts),
             specular: lights
                 && any(|m| m.specular != Vec3::ZERO || m.texture.is_some_and(|t| t.specular != Vec3::ZERO)),
@@ -39,7 +40,7 @@ impl Needs {
             textures: any(|m| m.texture.is_some()),
             area_lights: scene.lights.iter().any(|l| l.color != Vec3::ZERO && l.radius > 0.0),
             absorption: any(|m| m.refracts() && m.absorption != Vec3::ZERO),
-            shadow_rays: lights && any(super::Material::is_lit),
+            shadow_rays: lights && (any(super::Material::is_lit) || !skips.has(Skip::ShadowRays)),
         }
     }
 
@@ -47,6 +48,13 @@ impl Needs {
     #[must_use]
     pub fn secondary_rays(&self) -> bool {
         self.reflection || self.refraction
+    }
+
+    /// Whether hits of a material may send rays on. Where something refracts, a boundary of index 1 may be one between two
+    /// media, and mirrors.
+    #[must_use]
+    pub fn may_branch(&self, m: &super::Material) -> bool {
+        m.reflects() || m.refracts() || (self.refraction && m.reflect == Reflect::Fresnel)
     }
 
     /// Each need by name.

@@ -10,6 +10,7 @@ mod probe;
 mod sampling;
 mod scenes;
 mod signals;
+mod skips;
 mod verify;
 
 use assert_cmd::Command;

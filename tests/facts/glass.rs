@@ -4,7 +4,7 @@ use crate::kit::{Told, build, job, load, looking, rays, render};
 use glam::{DMat3, DVec3};
 use tison::backend::BackendKind;
 use tison::math::Random;
-use tison::render::Job;
+use tison::render::{self, Control, Job};
 
 const WALLS: &str = "
 [material.wall]
@@ -233,6 +233,27 @@ fn depth_is_no_matter_of_memory() {
             let outcome = render(kind, &scene, &Job { k_max, ..job(1, 1) });
             assert_eq!(outcome.stats.rays.reflected, u64::from(k_max), "{kind:?}");
             assert_eq!(outcome.stats.non_finite_samples, 0);
+        }
+    }
+}
+
+#[test]
+fn a_surface_of_index_one_mirrors_in_water_and_not_in_air() {
+    let coat = "[material.coat]\ncolor = 0.5\nreflect = 'fresnel'\nior = 1\n
+        [[object]]\nshape = 'sphere'\nradius = 1\nmaterial = 'coat'\n";
+    let water = "[[object]]\nshape = 'sphere'\nradius = 3\nmaterial = 'water'\n";
+    let (eye, d) = (DVec3::new(10.0, 0.2, 0.1), DVec3::NEG_X);
+    for (around, mirrored) in [(water, true), ("", false)] {
+        let scene = load(&(WALLS.to_owned() + coat + around));
+        for &kind in BackendKind::COMPILED {
+            let backend = build(kind, &scene);
+            let told = rays(&scene, &looking(eye, d), &backend, &one(1), (0, 0));
+            let control = Control::default();
+            let outcome =
+                render::run(&scene.scene, &looking(eye, d), &backend, &one(1), &control).expect("a good camera");
+            let reflected = told.iter().filter(|t| t.what == "reflected").count();
+            assert_eq!(reflected > 0, mirrored, "{kind:?}: {told:?}");
+            assert_eq!(outcome.stats.rays.reflected, reflected as u64, "{kind:?}: {told:?}");
         }
     }
 }

@@ -8,3 +8,4 @@ mod kit;
 mod light;
 mod places;
 mod sampling;
+mod skips;

@@ -92,6 +92,7 @@ pub enum BuildError {
 /// A frozen scene, traced without Embree.
 pub struct Native {
     world: World,
+    quality: Quality,
 }
 
 impl Native {
@@ -105,7 +106,7 @@ impl Native {
     /// If it was cancelled, a placement cannot be undone, or there are 2^29 triangles and shapes
     /// and more.
     pub fn build(objects: &[Object], options: &BuildOptions<'_>) -> Result<Self, BuildError> {
-        Ok(Self { world: World::build(objects, options)? })
+        Ok(Self { world: World::build(objects, options)?, quality: options.quality })
     }
 
     /// Nearest hit of a ray in f64, inside its open interval; everything is decided in f64. A direction of zero length,
@@ -113,6 +114,12 @@ impl Native {
     #[must_use]
     pub fn intersect_exact(&self, ray: &Ray64) -> Option<Hit64> {
         self.world.nearest_exact(ray)
+    }
+
+    /// How much time the hierarchies took.
+    #[must_use]
+    pub fn quality(&self) -> Quality {
+        self.quality
     }
 
     /// Bytes of the hierarchies with their copies of the triangles.

@@ -1,6 +1,7 @@
 //! `bench`: how right and how fast the tracer is.
 
 mod error;
+mod skip;
 
 use super::exit::{Exit, Failure};
 use super::message::Messages;
@@ -23,6 +24,9 @@ pub enum Bench {
     /// Run time against error of pictures: who needs how many samples and seconds, and how fast the error falls
     #[command(after_long_help = error::AFTER_HELP)]
     Error(error::ErrorArgs),
+    /// What is left out because a scene does not need it: what that saves, and that the picture is the same
+    #[command(after_long_help = skip::AFTER_HELP)]
+    Skip(skip::SkipArgs),
 }
 
 /// Where what was measured goes.
@@ -91,6 +95,7 @@ pub fn bench(what: &Bench, messages: &Messages) -> Result<Exit, Failure> {
         Bench::Stability(args) => stability(args, messages),
         Bench::Speed(args) => speed(args, messages),
         Bench::Error(args) => error::error(args, messages),
+        Bench::Skip(args) => skip::run(args, messages),
     }
 }
 

@@ -142,6 +142,7 @@ impl Run<'_> {
         let reading = &self.args.reading;
         let reading = Reading {
             reader: reading.obj_reader,
+            skips: tison::scene::Skips::ALL,
             exact: true,
             smooth: None,
             allow: &reading.allow_path,

@@ -141,6 +141,7 @@ impl<'a> Run<'a, '_> {
         let (started, args) = (Instant::now(), self.args);
         let reading = Reading {
             reader: args.reading.obj_reader,
+            skips: tison::scene::Skips::ALL,
             exact: false,
             smooth: None,
             allow: &args.reading.allow_path,

@@ -8,9 +8,8 @@ use std::sync::LazyLock;
 const BITS: usize = 16;
 
 /// What each bit of a shuffled index, highest first, adds to each of the first four dimensions.
-static DIRECTIONS: LazyLock<[[u32; BITS]; 4]> = LazyLock::new(|| {
-    [0, 1, 2, 3].map(|dimension| std::array::from_fn(|bit| sobol_rev(1 << (31 - bit), dimension)))
-});
+static DIRECTIONS: LazyLock<[[u32; BITS]; 4]> =
+    LazyLock::new(|| [0, 1, 2, 3].map(|dimension| std::array::from_fn(|bit| sobol_rev(1 << (31 - bit), dimension))));
 
 /// Where `sobol_burley` tells its own seeds apart: of the index, and of the dimensions.
 const INDEX_SEED: u32 = 0x79c6_8e4a;

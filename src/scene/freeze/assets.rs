@@ -78,6 +78,11 @@ impl<'a> Finder<'a> {
         path
     }
 
+    /// The file that `written` means, if there is one.
+    pub fn find_quietly(&self, written: &Path) -> Option<PathBuf> {
+        resolve_asset(self.scene, written, self.allow).ok()
+    }
+
     fn tell(&self, e: &AssetError, place: Place) {
         match e {
             AssetError::NotFound { written, tried } => {

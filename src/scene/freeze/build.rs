@@ -48,12 +48,12 @@ impl Materials {
     }
 }
 
-/// The light in scene space, unless it gives none.
-pub fn light(desc: &LightDesc, frame: &Frame) -> Option<Light> {
+/// The light in scene space. One that gives none is dropped, unless it is to be kept.
+pub fn light(desc: &LightDesc, frame: &Frame, keep: bool) -> Option<Light> {
     let color = palette::rgb(desc.color.into());
     let unit = frame.world_per_local();
     let falloff = (unit * unit).clamp(f64::MIN_POSITIVE, f64::MAX);
-    (color != Vec3::ZERO).then(|| Light {
+    (color != Vec3::ZERO || keep).then(|| Light {
         position: frame.to_local(desc.position),
         color,
         radius: desc.radius * frame.local_per_world(),

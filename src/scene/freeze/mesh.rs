@@ -5,7 +5,7 @@ use super::mtl;
 use crate::geom::{self, TriangleMesh};
 use crate::math::Frame;
 use crate::scene::obj::{self, CornerData, MtlMaterial, Uv};
-use crate::scene::{Error, Instance, Material, Mesh, MeshData, MeshPaint, Object, Warning, read_mesh, smooth};
+use crate::scene::{Error, Instance, Material, Mesh, MeshData, MeshPaint, Object, Skip, Warning, read_mesh, smooth};
 use glam::{DAffine3, DMat3, Vec3};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -42,7 +42,7 @@ impl MeshFile {
         let read = obj::ReadOptions {
             reader: assets.options.reader,
             normals: true,
-            uv: if assets.options.exact { Uv::Always } else { wanted.uv },
+            uv: if assets.options.exact || !assets.options.skips.has(Skip::Uv) { Uv::Always } else { wanted.uv },
             materials: wanted.materials,
             rests: assets.options.exact,
             allow: &assets.options.allow,

@@ -23,9 +23,10 @@ pub use shapes::OneShape;
 use super::desc::SceneDesc;
 use super::format::{self, Format, Mistakes};
 use super::texture::Encoding;
-use super::{Error, LoadOptions, Loaded, Scene};
+use super::{Error, LoadOptions, Loaded, Scene, Skip};
 use assets::{Finder, Progress};
 use build::{Builder, Materials};
+use glam::Vec3;
 use palette::Palette;
 use placed::Placed;
 use plan::{Plan, Source};
@@ -62,13 +63,17 @@ pub fn load_text(path: &Path, text: Vec<u8>, options: &LoadOptions<'_>) -> Resul
     let frame = placed.frame;
     let materials = Materials::of(&desc, &palette, &plan, &meshes, &numbers, &frame);
     let SceneDesc { render, cameras, lights, objects, .. } = desc;
+    let keep_dark = !options.skips.has(Skip::DarkLights);
+    let mut lights: Vec<_> = lights.iter().filter_map(|l| build::light(l, &frame, keep_dark)).collect();
+    // The dark ones come last: samples at the others go by their numbers.
+    lights.sort_by_key(|l| l.color == Vec3::ZERO);
     let builder = Builder { palette, plan, placed, firsts: materials.firsts, mistakes: &mistakes };
     let scene = Scene {
         frame,
         objects: builder.objects(&objects, meshes)?,
         materials: materials.all,
         textures,
-        lights: lights.iter().filter_map(|l| build::light(l, &frame)).collect(),
+        lights,
         ambient: palette::rgb(render.ambient.unwrap_or_default().into()),
         background: palette::rgb(render.background.unwrap_or_default().into()),
         course_rules: render.course_rules,

@@ -3,9 +3,9 @@
 use super::assets::{Assets, Finder};
 use super::mesh::Wanted;
 use super::palette::{self, Palette};
-use crate::scene::Unused;
 use crate::scene::desc::{MaterialDesc, SceneDesc, ShapeDesc};
 use crate::scene::obj::Uv;
+use crate::scene::{Skip, Unused};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
@@ -47,6 +47,13 @@ impl Plan {
         finder: &mut Finder<'_>,
     ) -> Self {
         let mut plan = Self { slots: plan_images(desc, palette, assets, finder), ..Self::default() };
+        if !assets.options.skips.has(Skip::UnusedAssets) {
+            // After the others: their numbers stay.
+            for texture in desc.materials.iter().filter_map(|m| m.texture.as_ref()) {
+                let found = finder.find_quietly(&texture.path);
+                found.map(|path| assets.images.want(&path, texture.nearest));
+            }
+        }
         let mut known: HashMap<PathBuf, usize> = HashMap::new();
         for (object, &material) in desc.objects.iter().zip(&palette.of_object) {
             let ShapeDesc::Mesh { path, smooth, place } = &object.shape else { continue };
