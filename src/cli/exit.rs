@@ -114,6 +114,8 @@ impl From<scene::Error> for Failure {
             scene::Error::NoRoom { .. } => {
                 Self { exit: Exit::Limit, ..failure }.help("unpack it into a file: such files are read piece by piece")
             }
+            scene::Error::TooLarge { .. } => Self { exit: Exit::Limit, ..failure }
+                .help("render it where there is more memory, or a smaller mesh or image"),
             scene::Error::At { path, line, column, .. } => Self { place: Place::Text(path, line, column), ..failure },
             _ => failure,
         }

@@ -41,6 +41,8 @@ pub struct Plan {
     pub backend: Backends,
     /// Threads to work with.
     pub threads: usize,
+    /// Bytes that the process may hold.
+    pub max_memory: Option<u64>,
     /// Where the image goes.
     pub outputs: Vec<Output>,
     /// Where the figures go.
@@ -111,6 +113,7 @@ impl Plan {
             camera: args.camera.clone(),
             aovs: each_once(&args.aov),
             threads: args.threads.map_or_else(all_threads, usize::from),
+            max_memory: args.max_memory,
             progress: if args.quiet { ProgressMode::None } else { args.progress },
             quiet: args.quiet,
             verbose: args.verbose,

@@ -33,6 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         threads,
         rays_expected: 3 * u64::from(args.size.0) * u64::from(args.size.1),
         cancel: &cancel,
+        memory_limit: None,
         progress: None,
     };
     let low = build.prefers_quick_build(&scene);
