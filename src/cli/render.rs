@@ -2,7 +2,7 @@
 
 use super::both::{self, Comparison};
 use super::camera::{self, Chosen};
-use super::exit::{Exit, Failure};
+use super::exit::{self, Exit, Failure};
 use super::frame::Frame;
 use super::memory::Memory;
 use super::message::Messages;
@@ -503,6 +503,7 @@ pub fn build_failure(e: &backend::Error) -> Failure {
 fn no_room_for_hierarchy(needed: u64, free: u64) -> Failure {
     let (needed, free) = (bytes(needed), bytes(free));
     Failure::new(Exit::Limit, format!("the hierarchy needs at least {needed} while it is built, but {free} are free"))
+        .help(exit::MORE_MEMORY)
 }
 
 /// Adds frame number `index` to what came before.

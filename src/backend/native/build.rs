@@ -121,6 +121,8 @@ pub(super) fn build(
     };
     let only_meshes = sources.iter().all(|s| matches!(s, Source::Mesh(_)));
     let at = if only_meshes { tree.leaves.len() } else { tree.blocks_first(is_apart) };
+    // Joining took as much memory again, and the leaves are still to come.
+    builder.check()?;
     let (blocks, others) = tree.leaves.split_at(at);
     held.take(blocks.len() * size_of::<Block>() + others.len() * size_of::<Apart>())?;
     let blocks = blocks.par_iter().with_min_len(TASK).map(block).collect();
