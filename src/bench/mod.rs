@@ -11,7 +11,8 @@
 //! | `leaving` | rays that leave surfaces: how many meet them again |
 //! | `cost` | the time of a test and of a refinement |
 //! | `stability` | all of that in one report |
-//! | `speed` | the native tracer against Embree |
+//! | `record` | the rays of a render, asked again without it |
+//! | `speed` | the native tracer, Embree and a bare loop over Embree |
 //! | `error` | run time against error of whole pictures |
 //! | `report`, `plot` | tables, pages, SVG |
 //!
@@ -22,6 +23,7 @@ pub mod cost;
 pub mod error;
 pub mod leaving;
 pub mod plot;
+pub mod record;
 pub mod report;
 pub mod robust;
 pub mod setup;
