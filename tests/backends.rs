@@ -113,7 +113,13 @@ fn scene() -> impl Strategy<Value = Scene> {
 }
 
 fn build(kind: BackendKind, scene: &Scene) -> AnyBackend {
-    let options = BuildOptions { threads: 1, rays_expected: 1 << 40, cancel: &AtomicBool::new(false), progress: None };
+    let options = BuildOptions {
+        threads: 1,
+        rays_expected: 1 << 40,
+        cancel: &AtomicBool::new(false),
+        memory_limit: None,
+        progress: None,
+    };
     AnyBackend::build(kind, scene, &options).expect("a good scene")
 }
 

@@ -38,6 +38,8 @@ pub struct BuildOptions<'a> {
     pub threads: usize,
     /// Rays the render is going to send: few of them do not pay for a good hierarchy.
     pub rays_expected: u64,
+    /// Bytes that the build may hold at once, the hierarchy included and the scene not; `None` means no limit.
+    pub memory_limit: Option<u64>,
     /// Set by another thread to give up.
     pub cancel: &'a AtomicBool,
     /// Told the share that is done, from any thread.
@@ -119,7 +121,8 @@ impl AnyBackend {
             BackendKind::Native => {
                 let quality =
                     if options.prefers_quick_build(scene) { native::Quality::Fast } else { native::Quality::Good };
-                let build = native::BuildOptions { quality, cancel: options.cancel };
+                let build =
+                    native::BuildOptions { quality, cancel: options.cancel, memory_limit: options.memory_limit };
                 Ok(Self::Native(native::Native::build(&scene.objects, &build)?))
             }
         }
@@ -162,6 +165,16 @@ impl AnyBackend {
             #[cfg(feature = "embree")]
             Self::Embree(b) => b.is_quick(),
             Self::Native(b) => b.quality() == native::Quality::Fast,
+        }
+    }
+
+    /// Most bytes that were held at once while it was built.
+    #[must_use]
+    pub fn peak_bytes(&self) -> u64 {
+        match self {
+            #[cfg(feature = "embree")]
+            Self::Embree(b) => b.peak_bytes(),
+            Self::Native(b) => b.peak_bytes(),
         }
     }
 

@@ -24,11 +24,17 @@ impl EmbreeBackend {
     /// # Errors
     /// See [`Error`].
     pub fn build(scene: &Scene, options: &BuildOptions<'_>) -> Result<Self, Error> {
-        let device = device(options.threads)?;
+        let device = device(options.threads, options.memory_limit)?;
         let mut build = Build::new(scene, &device, options);
         let quality = build.quality;
         let scene = build.scene(scene)?;
         Ok(Self { scene, device, quality })
+    }
+
+    /// The scene that answers, for who wants to ask it without the backend.
+    #[must_use]
+    pub fn scene(&self) -> &embree::Scene {
+        &self.scene
     }
 
     /// Bytes that Embree holds.
@@ -41,6 +47,12 @@ impl EmbreeBackend {
     #[must_use]
     pub fn is_quick(&self) -> bool {
         matches!(self.quality, Quality::Low)
+    }
+
+    /// Most bytes that Embree held at once.
+    #[must_use]
+    pub fn peak_bytes(&self) -> u64 {
+        self.device.memory_peak()
     }
 
     /// Release, packet width, build quality.
@@ -56,9 +68,9 @@ impl EmbreeBackend {
     }
 }
 
-/// A device that builds with `threads` threads; 0 is all.
-pub(super) fn device(threads: usize) -> Result<Device, Error> {
-    Ok(Device::new(&DeviceConfig { threads, ..DeviceConfig::default() })?)
+/// A device that builds with `threads` threads, 0 is all, and may hold so many bytes.
+pub(super) fn device(threads: usize, memory_limit: Option<u64>) -> Result<Device, Error> {
+    Ok(Device::new(&DeviceConfig { threads, memory_limit, ..DeviceConfig::default() })?)
 }
 
 /// The hierarchy of `scene` for rays in f64 that start within `reach` of the origin along each axis.

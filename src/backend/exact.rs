@@ -48,7 +48,7 @@ impl ExactMaker {
     pub fn new(kind: BackendKind, threads: usize) -> Result<Self, Error> {
         let kind = match kind {
             #[cfg(feature = "embree")]
-            BackendKind::Embree => Kind::Embree(super::embree::device(threads)?),
+            BackendKind::Embree => Kind::Embree(super::embree::device(threads, None)?),
             #[cfg(not(feature = "embree"))]
             BackendKind::Embree => return Err(Error::NotCompiledIn),
             BackendKind::Native => Kind::Native,
@@ -76,7 +76,8 @@ impl ExactMaker {
             Kind::Embree(device) => Tracer::Embree(super::embree::build_exact(scene, device, reach + slack, options)?),
             Kind::Native => {
                 let quality = native::Quality::Good;
-                let options = native::BuildOptions { quality, cancel: options.cancel };
+                let options =
+                    native::BuildOptions { quality, cancel: options.cancel, memory_limit: options.memory_limit };
                 Tracer::Native(native::Native::build(&scene.objects, &options)?)
             }
         };

@@ -3,10 +3,12 @@
 mod any;
 #[cfg(feature = "embree")]
 pub mod embree;
+mod estimate;
 mod exact;
 pub mod native;
 
 pub use any::{AnyBackend, BackendKind, BuildOptions, Error};
+pub use estimate::Estimate;
 pub use exact::{ExactBackend, ExactMaker};
 
 use crate::geom::{Coherence, Hit, PacketBatch, Ray, RayHitPacket, RayPacket};

@@ -12,7 +12,8 @@
 //! | `cost` | the time of a test and of a refinement |
 //! | `stability` | all of that in one report |
 //! | `skip` | what is left out: what that saves, and that it changes nothing |
-//! | `speed` | the native tracer against Embree |
+//! | `record` | the rays of a render, asked again without it |
+//! | `speed` | the native tracer, Embree and a bare loop over Embree |
 //! | `error` | run time against error of whole pictures |
 //! | `report`, `plot`, `bars` | tables, pages, SVG |
 //!
@@ -24,6 +25,7 @@ pub mod cost;
 pub mod error;
 pub mod leaving;
 pub mod plot;
+pub mod record;
 pub mod report;
 pub mod robust;
 pub mod setup;

@@ -160,7 +160,7 @@ pub struct ReadingArgs {
     pub obj_reader: Reader,
 }
 
-#[derive(Args, Debug)]
+#[derive(Args, Debug, Default)]
 pub struct RenderArgs {
     /// Scene (.toml, .json, .ray) or mesh (.obj, .ply, also .gz or .zst of these) to render; a mesh is framed and lit
     /// unless told otherwise
@@ -199,6 +199,10 @@ pub struct RenderArgs {
         allow_negative_numbers = true, help_heading = "Running"
     )]
     pub threads: Option<u16>,
+    /// Memory that the process may hold (RSS: program, scene, hierarchy, image), like 512M, 1.5GiB, 800MB; what needs
+    /// more is refused before it starts, or stopped, with exit code 6 and nothing written
+    #[arg(long, value_name = "SIZE", value_parser = parse::memory, allow_hyphen_values = true, help_heading = "Running")]
+    pub max_memory: Option<u64>,
     /// How to show progress, on stderr
     #[arg(long, value_enum, value_name = "HOW", default_value = "auto", help_heading = "Running")]
     pub progress: ProgressMode,
@@ -388,9 +392,10 @@ pub struct CameraArgs {
 }
 
 /// How progress is shown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum ProgressMode {
     /// A bar on a terminal, else plain
+    #[default]
     Auto,
     /// One line that is drawn over
     Bar,

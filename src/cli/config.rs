@@ -19,6 +19,7 @@ pub fn of_run(args: &RenderArgs, plan: &Plan) -> Vec<Setting> {
     list.extend(plan.stats.iter().map(|t| given("stats", t.name())));
     list.push(setting("backend", plan.backend.name().into(), args.backend.is_some()));
     list.push(setting("threads", plan.threads.to_string(), args.threads.is_some()));
+    list.extend(plan.max_memory.map(|bytes| given("max-memory", bytes.to_string())));
     list.push(setting("obj-reader", plan.reader.name().into(), plan.reader != Reader::default()));
     list.extend(plan.smooth.map(|angle| given("smooth", angle.to_string())));
     list.extend(plan.camera.turntable.map(|n| given("turntable", n.to_string())));

@@ -39,6 +39,9 @@ impl From<Exit> for ExitCode {
     }
 }
 
+/// What to do where memory is short and no limit was given.
+pub const MORE_MEMORY: &str = "render it where there is more memory, or a smaller mesh or image";
+
 /// Why a run did not end well, said to the user by `message`.
 #[derive(Debug)]
 pub struct Failure {
@@ -114,6 +117,7 @@ impl From<scene::Error> for Failure {
             scene::Error::NoRoom { .. } => {
                 Self { exit: Exit::Limit, ..failure }.help("unpack it into a file: such files are read piece by piece")
             }
+            scene::Error::TooLarge { .. } => Self { exit: Exit::Limit, ..failure }.help(MORE_MEMORY),
             scene::Error::At { path, line, column, .. } => Self { place: Place::Text(path, line, column), ..failure },
             _ => failure,
         }

@@ -1,12 +1,14 @@
 //! `info` and `check`: read a file and tell about it.
 
-use super::args::{CheckArgs, InfoArgs, ProgressMode, ReadingArgs};
+use super::args::{CheckArgs, InfoArgs, ProgressMode, ReadingArgs, RenderArgs};
+use super::cost::Cost;
 use super::exit::{Exit, Failure};
 use super::message::Messages;
 use super::notice::Notice;
-use super::plan::Input;
+use super::plan::{Input, Plan};
 use super::progress::Progress;
 use super::render::Reading;
+use super::settings::Settings;
 use super::signals::Signals;
 use super::style::{bytes, counted, grouped};
 use super::{output, render, stats, system};
@@ -33,11 +35,21 @@ pub fn info(args: &InfoArgs, messages: &Messages) -> Result<Exit, Failure> {
             loaded.scene.light_from(&camera);
         }
     }
+    let cost = cost_of_render(args, &loaded)?;
     if args.json {
-        return output::print(format!("{:#}\n", as_json(&args.file, &loaded)).as_bytes());
+        return output::print(format!("{:#}\n", as_json(&args.file, &loaded, &cost)).as_bytes());
     }
     messages.warnings(&Notice::about(&loaded), false, "tison check shows all");
-    output::print(as_text(&args.file, &loaded).as_bytes())
+    output::print(as_text(&args.file, &loaded, &cost).as_bytes())
+}
+
+/// What a render of the file without further flags takes.
+fn cost_of_render(args: &InfoArgs, loaded: &Loaded) -> Result<Cost, Failure> {
+    let file = Some(args.file.clone());
+    let plan = Plan::new(&RenderArgs { input: file, reading: args.reading.clone(), ..RenderArgs::default() })?;
+    let settings = Settings::new(&plan, &loaded.render)?;
+    let rays = render::rays_expected(&plan, &settings.job, &loaded.scene);
+    Ok(Cost::of_unbuilt(&loaded.scene, plan.backend.kinds(), rays))
 }
 
 /// Whether a file can be rendered.
@@ -75,11 +87,13 @@ fn load(file: &Path, reading: &ReadingArgs) -> Result<Loaded, Failure> {
     })
 }
 
-fn as_json(file: &Path, loaded: &Loaded) -> Value {
+fn as_json(file: &Path, loaded: &Loaded, cost: &Cost) -> Value {
     let scene = &loaded.scene;
     let bounds = scene.bounds();
     let needs: Map<_, _> =
         scene.needs().list().map(|(name, needed)| (name.to_owned(), needed.into())).into_iter().collect();
+    let mut memory = cost.json();
+    memory["peak_rss_bytes"] = system::peak_memory().into();
     json!({
         "file": file.to_string_lossy(),
         "scene": stats::scene_json(&scene.counts()),
@@ -91,7 +105,7 @@ fn as_json(file: &Path, loaded: &Loaded) -> Value {
         "materials": scene.materials.iter().map(material_json).collect::<Vec<_>>(),
         "textures": scene.textures.iter().map(|t| json!({ "width": t.width, "height": t.height })).collect::<Vec<_>>(),
         "needs": needs,
-        "memory": { "scene_bytes": scene.bytes(), "peak_rss_bytes": system::peak_memory() },
+        "memory": memory,
         "warnings": Notice::about(loaded).iter().map(ToString::to_string).collect::<Vec<_>>(),
     })
 }
@@ -163,7 +177,7 @@ fn light_json(l: &Light, frame: &Frame) -> Value {
     })
 }
 
-fn as_text(file: &Path, loaded: &Loaded) -> String {
+fn as_text(file: &Path, loaded: &Loaded, cost: &Cost) -> String {
     let scene = &loaded.scene;
     let mut out = format!("{}\n", file.display());
     let mut row = |name: &str, value: String| {
@@ -186,8 +200,11 @@ fn as_text(file: &Path, loaded: &Loaded) -> String {
     };
     row("needs", names(true));
     row("needs not", names(false));
-    let peak = system::peak_memory().map_or(String::new(), |p| format!(", peak {}", bytes(p)));
-    row("memory", format!("scene {}{peak}", bytes(scene.bytes() as u64)));
+    row("memory", cost.text());
+    row("", cost.buffers_text());
+    if let Some(peak) = system::peak_memory() {
+        row("", format!("peak {} to read it", bytes(peak)));
+    }
     let textured = scene.materials.iter().filter(|m| m.texture.is_some()).count() as u64;
     let with_texture = if textured > 0 { format!(", {} with a texture", grouped(textured)) } else { String::new() };
     row("materials", grouped(scene.materials.len() as u64) + &with_texture);

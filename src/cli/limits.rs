@@ -2,8 +2,8 @@
 
 use super::exit::{Exit, Failure};
 use super::frame::Frame;
+use super::memory::Memory;
 use super::style::bytes;
-use super::system;
 use tison::film::{Aov, Film};
 use tison::render;
 
@@ -11,13 +11,18 @@ use tison::render;
 pub const MAX_SIDE: u64 = 65_535;
 
 /// Refuses images that are too large for tison or for this machine's free memory.
-pub fn check(frame: &Frame, aovs: &[Aov], adaptive: bool) -> Result<(), Failure> {
+/// What it takes is kept free from now on.
+pub fn check(frame: &Frame, aovs: &[Aov], adaptive: bool, memory: &Memory) -> Result<(), Failure> {
     if frame.pixel.is_some() {
         return Ok(());
     }
     let crop = frame.crop;
     let (width, height) = (u64::from(crop.x1 - crop.x0), u64::from(crop.y1 - crop.y0));
-    refuse(width, height, memory_needed(width, height, aovs, adaptive), system::available_memory())
+    let needed = memory_needed(width, height, aovs, adaptive);
+    memory.reserve(0);
+    refuse(width, height, needed, memory.free()).map_err(|f| memory.explained(f))?;
+    memory.reserve(needed);
+    Ok(())
 }
 
 /// The film, and as much again for the encoder's copy of it; before that, what adaptive sampling knows of the pixels.

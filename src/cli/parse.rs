@@ -141,6 +141,36 @@ pub fn pixels_per_degree(s: &str) -> Result<f64, String> {
     if (1.0..=1000.0).contains(&v) { Ok(v) } else { Err("expected 1 to 1000 pixels per degree".into()) }
 }
 
+/// Bytes: `512M`, `1.5GiB`, `800MB`, or a plain number. K, M, G and T stand for powers of 1024 unless a B follows.
+pub fn memory(s: &str) -> Result<u64, String> {
+    const EXPECTED: &str = "expected a size like 512M, 1.5GiB, 800MB, or a number of bytes";
+    let end = s.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(s.len());
+    let (number, unit) = (s[..end].trim(), s[end..].to_ascii_lowercase());
+    let (prefix, base) = match unit.strip_suffix("ib") {
+        Some(prefix) if !prefix.is_empty() => (prefix, 1024_u64),
+        _ => match unit.strip_suffix('b') {
+            Some(prefix) => (prefix, 1000),
+            None => (&*unit, 1024),
+        },
+    };
+    let power = match prefix {
+        "" => 0,
+        "k" => 1,
+        "m" => 2,
+        "g" => 3,
+        "t" => 4,
+        _ => return Err(EXPECTED.into()),
+    };
+    let digits = |c: char| c.is_ascii_digit() || (power > 0 && c == '.');
+    let value = if number.chars().all(digits) { number.parse::<f64>().ok() } else { None };
+    let bytes = value.ok_or(EXPECTED)? * base.pow(power) as f64;
+    if (1.0..1e18).contains(&bytes) {
+        Ok(bytes as u64)
+    } else {
+        Err("expected at least one byte and less than 10^18".into())
+    }
+}
+
 /// `path.to.key=value`; the scene file's reader says whether there is such a key.
 pub fn define(s: &str) -> Result<String, String> {
     match s.split_once('=') {
@@ -197,6 +227,39 @@ mod tests {
             assert_eq!(scale(s).ok(), want, "{s:?}");
         }
         assert!(scale("101").is_err() && scale("inf%").is_err() && scale("%").is_err());
+    }
+
+    #[test]
+    fn memory_sizes() {
+        let cases = [
+            ("512M", Some(512 << 20)),
+            ("2G", Some(2 << 30)),
+            ("1.5GiB", Some(3 << 29)),
+            ("1.5 gib", Some(3 << 29)),
+            ("800MB", Some(800_000_000)),
+            ("64k", Some(64 << 10)),
+            ("3kB", Some(3000)),
+            ("1T", Some(1 << 40)),
+            ("123456789", Some(123_456_789)),
+            ("100B", Some(100)),
+            ("0", None),
+            ("", None),
+            ("M", None),
+            ("1.5", None),
+            ("-1M", None),
+            ("1e3M", None),
+            ("nan", None),
+            ("inf", None),
+            ("5 bananas", None),
+            ("5iB", None),
+            ("1..5G", None),
+            ("99999999T", None),
+            ("1MiBi", None),
+        ];
+        for (s, want) in cases {
+            assert_eq!(memory(s).ok(), want, "{s:?}");
+        }
+        assert!(memory("much").unwrap_err().contains("512M"));
     }
 
     #[test]

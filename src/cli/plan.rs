@@ -44,6 +44,8 @@ pub struct Plan {
     pub backend: Backends,
     /// Threads to work with.
     pub threads: usize,
+    /// Bytes that the process may hold.
+    pub max_memory: Option<u64>,
     /// Where the image goes.
     pub outputs: Vec<Output>,
     /// Where the figures go.
@@ -115,6 +117,7 @@ impl Plan {
             aovs: each_once(&args.aov),
             skips: args.no_skip.iter().fold(Skips::ALL, |all, &one| all.and(one)),
             threads: args.threads.map_or_else(all_threads, usize::from),
+            max_memory: args.max_memory,
             progress: if args.quiet { ProgressMode::None } else { args.progress },
             quiet: args.quiet,
             verbose: args.verbose,

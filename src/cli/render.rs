@@ -2,8 +2,9 @@
 
 use super::both::{self, Comparison};
 use super::camera::{self, Chosen};
-use super::exit::{Exit, Failure};
+use super::exit::{self, Exit, Failure};
 use super::frame::Frame;
+use super::memory::Memory;
 use super::message::Messages;
 use super::notice::Notice;
 use super::plan::{Input, Plan};
@@ -11,38 +12,43 @@ use super::progress::{Progress, Stage};
 use super::report::{Report, certificate};
 use super::settings::Settings;
 use super::signals::Signals;
+use super::style::bytes;
 use super::target::{Output, Target};
 use super::{EMBREE, VERSION, config, limits, output, system, turntable};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
-use tison::backend::{self, AnyBackend, BackendKind, BuildOptions};
+use tison::backend::{self, AnyBackend, BackendKind, BuildOptions, Estimate, native};
+#[cfg(feature = "embree")]
+use tison::embree;
 use tison::film::{self, Display, Film, Notes, Tonemap};
 use tison::math::{Filter, Sampler};
 use tison::metrics::Difference;
 use tison::render::{self, Adapted, Control, Job, Outcome, RenderStats, Stop};
 use tison::scene::format::Override;
 use tison::scene::obj::Reader;
-use tison::scene::{self, CameraDesc, Light, LoadOptions, Loaded, Scene, Skip, Skips};
+use tison::scene::{self, CameraDesc, FreeMemory, Light, LoadOptions, Loaded, Scene, Skip, Skips};
 
 /// Does what the plan says.
 pub fn render(plan: &Plan, messages: &Messages) -> Result<Exit, Failure> {
     let started = Instant::now();
+    let control = Arc::new(Control::default());
+    let memory = Memory::watch(plan.max_memory, &control)?;
     if !plan.print_config {
         if let Some(frame) = plan.known_frame()? {
-            limits::check(&frame, &plan.aovs, plan.picture.is_adaptive())?;
+            limits::check(&frame, &plan.aovs, plan.picture.is_adaptive(), &memory)?;
         }
         plan.check_targets()?;
     }
-    let control = Arc::new(Control::default());
     let signals =
         Signals::install(&control).map_err(|e| Failure::new(Exit::Internal, "cannot listen for signals").because(e))?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(plan.threads)
         .build()
         .map_err(|e| Failure::new(Exit::Render, format!("cannot start {} threads", plan.threads)).because(e))?;
-    let run = Run { plan, messages, control: &control, progress: Progress::start(plan.progress, &control) };
+    let progress = Progress::start(plan.progress, &control);
+    let run = Run { plan, messages, control: &control, memory: &memory, progress };
     let done = pool.install(|| match plan.picture.pixel {
         _ if plan.print_config => run.config(),
         Some(_) => run.pixel(),
@@ -50,6 +56,8 @@ pub fn render(plan: &Plan, messages: &Messages) -> Result<Exit, Failure> {
     });
     match (done, signals.caught()) {
         (Ok(exit), None) => Ok(exit),
+        // Whatever failed after memory was full failed because of it.
+        (Err(f), None) if f.exit != Exit::Output => memory.check().and(Err(f)),
         // Whatever failed after a signal failed because of it, but for what the disk had to say.
         (Err(f), Some(exit)) if f.exit != Exit::Output => Err(Failure::new(exit, STOPPED)),
         (Ok(_), Some(exit)) => Ok(exit),
@@ -63,6 +71,7 @@ struct Run<'a> {
     plan: &'a Plan,
     messages: &'a Messages,
     control: &'a Control,
+    memory: &'a Memory,
     progress: Progress,
 }
 
@@ -121,7 +130,7 @@ impl Run<'_> {
         let mut done = Done::default();
         let mut ready = timed(&mut done.seconds.read, || self.read())?;
         let frame = Frame { size: ready.settings.job.size, crop: ready.settings.job.crop, pixel: None };
-        limits::check(&frame, &self.plan.aovs, self.plan.picture.is_adaptive())?;
+        limits::check(&frame, &self.plan.aovs, self.plan.picture.is_adaptive(), self.memory)?;
         self.plan.check_read(&ready.loaded.files)?;
         done.warnings = ready.warnings;
         done.seconds.textures = ready.loaded.texture_seconds.min(done.seconds.read);
@@ -151,6 +160,7 @@ impl Run<'_> {
     /// The hierarchies of all backends that are asked for.
     fn build_all(&self, ready: &Ready, done: &mut Done) -> Result<Vec<AnyBackend>, Failure> {
         let (kinds, mut backends) = (self.plan.backend.kinds(), Vec::new());
+        self.check_hierarchies(ready)?;
         let mut took = [0.0; 2];
         for (&kind, took) in kinds.iter().zip(&mut took) {
             backends.push(timed(took, || self.build(kind, &ready.loaded.scene, &ready.settings.job))?);
@@ -221,8 +231,10 @@ impl Run<'_> {
 
     fn rendered(&self, camera: &CameraDesc, ready: &Ready, backend: &AnyBackend) -> Result<Outcome, Failure> {
         self.progress.stage(Stage::Render);
-        render::run(&ready.loaded.scene, camera, backend, &ready.settings.job, self.control)
-            .map_err(|e| Failure::new(Exit::Usage, e))
+        let outcome = render::run(&ready.loaded.scene, camera, backend, &ready.settings.job, self.control);
+        // What is left of a render that took too much is not kept.
+        self.memory.check()?;
+        outcome.map_err(|e| Failure::new(Exit::Usage, e))
     }
 
     fn write(
@@ -273,7 +285,12 @@ impl Run<'_> {
             allow: &plan.allow,
             defines: &plan.defines,
         };
-        let loaded = load(&plan.input, &reading, self.control, &self.progress)?;
+        let free = || self.memory.free();
+        let hierarchy = plan.backend.kinds().iter().map(|&kind| Estimate::at_least_for_each_triangle(kind)).sum();
+        let free = FreeMemory::new(&free).with_triangles_of(hierarchy);
+        let loaded = load_within(free, &plan.input, &reading, self.control, &self.progress);
+        let loaded = loaded.map_err(|e| self.memory.explained(e.into()))?;
+        self.memory.check()?;
         let mut notices = Notice::about(&loaded);
         let settings = Settings::new(plan, &loaded.render)?;
         let chosen = camera::choose(plan, &loaded, &settings)?;
@@ -301,22 +318,36 @@ impl Run<'_> {
         }
     }
 
+    /// Refuses hierarchies that cannot fit, all of them together.
+    fn check_hierarchies(&self, ready: &Ready) -> Result<(), Failure> {
+        let (scene, job, kinds) = (&ready.loaded.scene, &ready.settings.job, self.plan.backend.kinds());
+        let options = BuildOptions { rays_expected: rays_expected(self.plan, job, scene), ..self.build_options() };
+        let needed = kinds.iter().map(|&kind| Estimate::of(kind, scene, &options).at_least).sum();
+        match self.memory.free() {
+            Some(free) if needed > free => Err(self.memory.explained(no_room_for_hierarchy(needed, free))),
+            _ => Ok(()),
+        }
+    }
+
+    fn build_options(&self) -> BuildOptions<'_> {
+        BuildOptions {
+            threads: self.plan.threads,
+            rays_expected: u64::MAX,
+            cancel: &self.control.cancel,
+            memory_limit: self.memory.free().filter(|_| self.memory.is_limited()),
+            progress: None,
+        }
+    }
+
     fn build(&self, kind: BackendKind, scene: &Scene, job: &Job) -> Result<AnyBackend, Failure> {
         self.progress.stage(Stage::Build);
-        let (crop, frames) = (job.crop, self.plan.camera.turntable.unwrap_or(1));
-        let pixels = u64::from(crop.x1 - crop.x0) * u64::from(crop.y1 - crop.y0) * u64::from(frames);
-        self.progress.expect_pixels(pixels * self.plan.backend.kinds().len() as u64);
-        let at_light = |l: &Light| if l.radius > 0.0 { u64::from(job.light_samples) } else { 1 };
-        let rays_per_sample = 1 + scene.lights.iter().map(at_light).sum::<u64>();
-        let rays = pixels.saturating_mul(u64::from(job.spp)).saturating_mul(rays_per_sample);
+        self.progress.expect_pixels(pixels(self.plan, job) * self.plan.backend.kinds().len() as u64);
         let options = BuildOptions {
-            threads: self.plan.threads,
-            // However many there may be, a good hierarchy is worth while.
-            rays_expected: if job.skips.has(Skip::BuildQuality) { rays } else { u64::MAX },
-            cancel: &self.control.cancel,
+            rays_expected: rays_expected(self.plan, job, scene),
             progress: Some(&|share| self.progress.report(share)),
+            ..self.build_options()
         };
-        AnyBackend::build(kind, scene, &options).map_err(|e| build_failure(&e))
+        AnyBackend::build(kind, scene, &options).map_err(|e| self.memory.explained(build_failure(&e)))
     }
 
     fn save(
@@ -350,6 +381,23 @@ impl Run<'_> {
     }
 }
 
+/// Pixels of all frames.
+fn pixels(plan: &Plan, job: &Job) -> u64 {
+    let (crop, frames) = (job.crop, plan.camera.turntable.unwrap_or(1));
+    u64::from(crop.x1 - crop.x0) * u64::from(crop.y1 - crop.y0) * u64::from(frames)
+}
+
+/// Rays that decide which hierarchy is worth its time: camera and shadow rays of all frames.
+pub fn rays_expected(plan: &Plan, job: &Job, scene: &Scene) -> u64 {
+    if !job.skips.has(Skip::BuildQuality) {
+        // However many there may be, a good hierarchy is worth while.
+        return u64::MAX;
+    }
+    let at_light = |l: &Light| if l.radius > 0.0 { u64::from(job.light_samples) } else { 1 };
+    let rays_per_sample = 1 + scene.lights.iter().map(at_light).sum::<u64>();
+    pixels(plan, job).saturating_mul(u64::from(job.spp)).saturating_mul(rays_per_sample)
+}
+
 /// How a file is read, as the flags have it.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading<'a> {
@@ -369,6 +417,17 @@ pub fn load(
     control: &Control,
     progress: &Progress,
 ) -> Result<Loaded, scene::Error> {
+    load_within(FreeMemory::new(&system::available_memory), path, reading, control, progress)
+}
+
+/// The same within what memory is free.
+fn load_within(
+    free_memory: FreeMemory<'_>,
+    path: &Path,
+    reading: &Reading<'_>,
+    control: &Control,
+    progress: &Progress,
+) -> Result<Loaded, scene::Error> {
     let report = |done: u64, total: u64| progress.report(done as f64 / total.max(1) as f64);
     let options = LoadOptions {
         reader: reading.reader,
@@ -378,7 +437,7 @@ pub fn load(
         allow: reading.allow.to_vec(),
         overrides: reading.defines.iter().map(|d| Override::from(d.as_str())).collect(),
         cancel: &control.cancel,
-        free_memory: system::available_memory,
+        free_memory,
         progress: Some(&report),
     };
     scene::load(path, &options)
@@ -428,10 +487,15 @@ fn notes(plan: &Plan, settings: &Settings, backend: &AnyBackend) -> Notes {
 pub fn build_failure(e: &backend::Error) -> Failure {
     let exit = match e {
         backend::Error::NotCompiledIn => Exit::Usage,
-        #[cfg(feature = "embree")]
-        backend::Error::Embree(tison::embree::Error::OverBudget { .. } | tison::embree::Error::OutOfMemory { .. }) => {
-            Exit::Limit
+        backend::Error::Native(native::BuildError::OverBudget { needed, limit }) => {
+            return no_room_for_hierarchy(*needed, *limit);
         }
+        #[cfg(feature = "embree")]
+        backend::Error::Embree(embree::Error::OverBudget { needed, limit }) => {
+            return no_room_for_hierarchy(*needed, *limit);
+        }
+        #[cfg(feature = "embree")]
+        backend::Error::Embree(embree::Error::OutOfMemory { .. }) => Exit::Limit,
         _ => Exit::Render,
     };
     let mut text = e.to_string();
@@ -441,6 +505,12 @@ pub fn build_failure(e: &backend::Error) -> Failure {
         source = cause.source();
     }
     Failure::new(exit, text)
+}
+
+fn no_room_for_hierarchy(needed: u64, free: u64) -> Failure {
+    let (needed, free) = (bytes(needed), bytes(free));
+    Failure::new(Exit::Limit, format!("the hierarchy needs at least {needed} while it is built, but {free} are free"))
+        .help(exit::MORE_MEMORY)
 }
 
 /// Adds frame number `index` to what came before.

@@ -1,6 +1,7 @@
 //! What a run tells when it is over: one screen on stderr, and figures for programs.
 
 use super::both::Comparison;
+use super::cost::Cost;
 use super::exit::Failure;
 use super::message::Messages;
 use super::plan::Plan;
@@ -28,8 +29,7 @@ pub struct Report<'a> {
     pub fresnel: usize,
     /// Whether the first hierarchy was built quickly.
     pub quick: bool,
-    pub scene_bytes: u64,
-    pub backend_bytes: u64,
+    pub cost: Cost,
     /// Release, packet width, build quality.
     pub details: String,
     /// Of the first frame.
@@ -50,8 +50,7 @@ impl<'a> Report<'a> {
             unused: ready.loaded.unused,
             fresnel: scene.materials.iter().filter(|m| m.reflect == Reflect::Fresnel && !m.reflects()).count(),
             quick: backends.first().is_some_and(AnyBackend::is_quick),
-            scene_bytes: scene.bytes() as u64,
-            backend_bytes: backends.iter().map(AnyBackend::bytes).sum(),
+            cost: Cost::of_built(scene, backends),
             details: backends.iter().map(AnyBackend::details).collect::<Vec<_>>().join(" and "),
             camera: ready.chosen.camera,
             done,
@@ -98,7 +97,6 @@ impl<'a> Report<'a> {
         }
     }
 
-    /// Memory of the scene and the hierarchy is told with -v only.
     fn lines(&self) -> Vec<String> {
         let mut lines = vec![self.input_line(), self.backend_line(), self.image_line(), self.rays_line()];
         lines.push(self.time_line());
@@ -106,7 +104,10 @@ impl<'a> Report<'a> {
         lines.extend(self.done.comparison.iter().flat_map(Comparison::lines));
         if self.plan.verbose {
             lines.push(self.camera_line());
-            lines.push(format!("memory    scene {}, hierarchy {}", bytes(self.scene_bytes), bytes(self.backend_bytes)));
+        }
+        lines.push(format!("memory    {}", self.cost.text()));
+        if self.plan.verbose {
+            lines.push(format!("buffers   {}", self.cost.buffers_text()));
         }
         lines.extend(self.skipped_line());
         lines.push(self.error_line());

@@ -73,7 +73,7 @@ pub fn json(report: &Report<'_>) -> Value {
         "adaptive": stats.adapted.map(adaptive),
         "mrays_per_s": report.mrays_per_s(),
         "peak_rss_bytes": report.peak_memory,
-        "memory": { "scene_bytes": report.scene_bytes, "backend_bytes": report.backend_bytes },
+        "memory": report.cost.json(),
         "skipped": skipped,
         "error": {
             "cut_off_max": stats.cut_off_max,

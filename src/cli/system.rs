@@ -12,6 +12,11 @@ pub fn peak_memory() -> Option<u64> {
     field(&fs::read_to_string("/proc/self/status").ok()?, "VmHWM:")
 }
 
+/// Bytes that this process holds in memory; nothing where the system does not say.
+pub fn resident_memory() -> Option<u64> {
+    field(&fs::read_to_string("/proc/self/status").ok()?, "VmRSS:")
+}
+
 /// The kernel writes `Name:   123 kB`, where kB means 1024 bytes.
 fn field(text: &str, name: &str) -> Option<u64> {
     let line = text.lines().find_map(|l| l.strip_prefix(name))?;
@@ -35,6 +40,7 @@ mod tests {
     #[cfg(target_os = "linux")]
     fn this_process_holds_some_memory_and_less_than_there_is() {
         let peak = peak_memory().unwrap();
+        assert!(resident_memory().unwrap() <= peak);
         assert!(peak > 100_000 && peak < available_memory().unwrap() * 100, "{peak}");
     }
 }

@@ -49,5 +49,6 @@ pub use device::{Device, DeviceConfig};
 pub use error::Error;
 pub use exact::{ExactBuilder, ExactScene, HitsAlong};
 pub use packet::Width;
+pub use raw::Bare;
 pub use scene::{Quality, Scene, SceneBuilder, SceneOptions};
 pub use user::PrimSet;

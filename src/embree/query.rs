@@ -316,7 +316,7 @@ pub(super) fn intersect_args(coherence: Coherence) -> sys::RTCIntersectArguments
 }
 
 #[inline]
-fn occluded_args(coherence: Coherence) -> sys::RTCOccludedArguments {
+pub(super) fn occluded_args(coherence: Coherence) -> sys::RTCOccludedArguments {
     let mut args = MaybeUninit::uninit();
     // SAFETY: fills the arguments that it is given.
     unsafe { sys::rtcInitOccludedArguments(args.as_mut_ptr()) };

@@ -103,12 +103,36 @@ pub enum Error {
         /// Bytes that were read, unpacked.
         read: u64,
     },
+    /// More than there is memory for, found out before it was stored.
+    #[error(
+        "{}: {what} takes at least {} of memory, but {} are free",
+        path.display(), rounded(*needed), rounded(*free)
+    )]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// What of it.
+        what: String,
+        /// Bytes that it takes at least.
+        needed: u64,
+        /// Bytes that can be had.
+        free: u64,
+    },
     /// A scene file with mistakes in it, in the order of their places.
     #[error("{}", in_short(.0))]
     Scene(Vec<Diagnostic>),
     /// The caller asked to stop.
     #[error("stopped on request")]
     Cancelled,
+}
+
+/// Bytes as people read them.
+fn rounded(bytes: u64) -> String {
+    match bytes {
+        0..1_000_000 => format!("{:.1} kB", bytes as f64 / 1e3),
+        1_000_000..1_000_000_000 => format!("{:.1} MB", bytes as f64 / 1e6),
+        _ => format!("{:.1} GB", bytes as f64 / 1e9),
+    }
 }
 
 /// One line a mistake.

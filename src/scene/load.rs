@@ -29,8 +29,8 @@ pub struct LoadOptions<'a> {
     pub overrides: Vec<Override>,
     /// Set by another thread to give up.
     pub cancel: &'a AtomicBool,
-    /// Asked while a pipe or a compressed mesh is read into memory.
-    pub free_memory: FreeMemory,
+    /// Asked before anything large is stored, and while a pipe or a compressed mesh is read into memory.
+    pub free_memory: FreeMemory<'a>,
     /// Told bytes read and bytes in all, from any thread.
     pub progress: Option<&'a (dyn Fn(u64, u64) + Sync)>,
 }
@@ -47,7 +47,7 @@ impl<'a> LoadOptions<'a> {
             allow: Vec::new(),
             overrides: Vec::new(),
             cancel,
-            free_memory: || None,
+            free_memory: FreeMemory::UNKNOWN,
             progress: None,
         }
     }

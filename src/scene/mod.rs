@@ -5,6 +5,7 @@
 //! power of two to a size of about 1, so that f32 spends its digits on the shape and not on
 //! where it stands. [`Frame`] leads there and back.
 
+mod buffers;
 mod camera;
 pub mod desc;
 mod error;
@@ -15,6 +16,7 @@ mod freeze;
 mod light;
 mod load;
 mod material;
+mod memory;
 mod mesh_format;
 mod needs;
 pub mod obj;
@@ -26,6 +28,7 @@ pub mod smooth;
 mod source;
 mod texture;
 
+pub use buffers::Buffers;
 pub use camera::{Camera, CameraDesc, CameraRays, Projection};
 pub use error::{Error, Warning};
 pub use framing::{CameraOverrides, View};
@@ -33,16 +36,16 @@ pub use freeze::OneShape;
 pub use light::Light;
 pub use load::{LoadOptions, Loaded, Unused, load, load_text};
 pub use material::{Material, Reflect, Textured};
+pub use memory::FreeMemory;
 pub use mesh_format::{MeshFormat, read_mesh};
 pub use needs::Needs;
 pub use object::{AnyShapes, Instance, Mesh, MeshData, MeshPaint, Object, Shapes};
 pub use skip::{Skip, Skips};
-pub use source::{FreeMemory, is_packed, unpacked_name};
+pub use source::{is_packed, unpacked_name};
 pub use texture::{Encoding, Texture};
 
-use crate::geom::{Bounds, ShapeSet};
+use crate::geom::Bounds;
 use crate::math::Frame;
-use crate::with_shapes;
 use glam::Vec3;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -171,18 +174,6 @@ impl Scene {
     pub fn shapes(&self) -> usize {
         let count = |o: &Object| if let Object::Shapes(s) = o { s.set.len() as usize } else { 0 };
         self.objects.iter().map(count).sum()
-    }
-
-    /// Bytes of geometry, normals, texture coordinates, material indices and textures.
-    #[must_use]
-    pub fn bytes(&self) -> usize {
-        let shapes = |o: &Object| match o {
-            Object::Shapes(s) => with_shapes!(&s.set, set => set.bytes()) + size_of_val(&s.materials[..]),
-            _ => 0,
-        };
-        self.meshes().map(MeshData::bytes).sum::<usize>()
-            + self.objects.iter().map(shapes).sum::<usize>()
-            + self.textures.iter().map(Texture::bytes).sum::<usize>()
     }
 
     /// Every mesh once, however often it is placed.

@@ -1,5 +1,6 @@
 //! What there is to hit: meshes, placed copies of meshes, and sets of analytic shapes.
 
+use super::Buffers;
 use super::obj::CornerData;
 use crate::geom::normal_matrix;
 use crate::geom::{Affine, Bounds, Cube, Cylinder, ExactTriangle, Plain, Quad, ShapeSet, Sphere, TriangleMesh};
@@ -172,11 +173,16 @@ impl MeshData {
 
     /// Bytes of all buffers.
     #[must_use]
-    pub fn bytes(&self) -> usize {
-        self.triangles.bytes()
-            + self.normals.as_ref().map_or(0, CornerData::bytes)
-            + self.uvs.as_ref().map_or(0, CornerData::bytes)
-            + self.face_materials.as_ref().map_or(0, |m| size_of_val(&m[..]))
+    pub fn buffers(&self) -> Buffers {
+        let indices = size_of_val(self.triangles.faces());
+        Buffers {
+            positions: self.triangles.bytes() - indices,
+            indices,
+            normals: self.normals.as_ref().map_or(0, CornerData::bytes),
+            uvs: self.uvs.as_ref().map_or(0, CornerData::bytes),
+            face_materials: self.face_materials.as_ref().map_or(0, |m| size_of_val(&m[..])),
+            ..Buffers::default()
+        }
     }
 }
 

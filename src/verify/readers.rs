@@ -49,7 +49,7 @@ pub fn compare(
     path: &Path,
     allow: &[PathBuf],
     cancel: &AtomicBool,
-    free_memory: FreeMemory,
+    free_memory: FreeMemory<'_>,
 ) -> Result<Compared, Error> {
     let options = |reader| ReadOptions { reader, allow, free_memory, ..ReadOptions::all(cancel) };
     let own = obj::read(path, &options(Reader::Own))?;

@@ -5,6 +5,7 @@ mod commands;
 mod compare;
 mod error;
 mod images;
+mod memory;
 mod meshes;
 mod probe;
 mod sampling;

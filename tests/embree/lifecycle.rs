@@ -98,6 +98,28 @@ fn a_mesh_is_shared_and_its_memory_is_not_counted() {
 }
 
 #[test]
+fn neither_corners_nor_indices_are_copied() {
+    // Many corners that no triangle has, and many triangles without area: the hierarchy has two triangles.
+    let few = grid(1);
+    let mut points = few.padded_points()[..12].to_vec();
+    points.resize(3_000_000, 0.5);
+    let mut faces = few.faces().to_vec();
+    faces.resize(300_000, [0, 1, 1]);
+    let mesh = Arc::new(TriangleMesh::new(points, faces));
+    let indices = size_of_val(mesh.faces()) as u64;
+    assert!(mesh.bytes() as u64 - indices >= 12_000_000 && indices == 3_600_000);
+    for quality in crate::rays::QUALITIES {
+        let device = device();
+        let mut builder = SceneBuilder::new(&device, SceneOptions { quality, ..SceneOptions::default() }).unwrap();
+        builder.mesh(mesh.clone()).unwrap();
+        let scene = builder.commit(None).unwrap();
+        assert!(scene.occluded(&Ray::new(Vec3::new(0.3, 0.2, -1.0), Vec3::Z)));
+        // Low quality keeps eight bytes of its own for each.
+        assert!(device.memory_live() < indices, "{quality:?}: {} bytes", device.memory_live());
+    }
+}
+
+#[test]
 fn a_build_over_the_limit_is_an_error_and_the_device_lives_on() {
     let limit = 1 << 20;
     let device = Device::new(&DeviceConfig { threads: 2, memory_limit: Some(limit), ..Default::default() }).unwrap();

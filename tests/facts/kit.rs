@@ -17,7 +17,13 @@ pub fn load(toml: &str) -> Loaded {
 }
 
 pub fn build(kind: BackendKind, loaded: &Loaded) -> AnyBackend {
-    let options = BuildOptions { threads: 0, rays_expected: 1 << 40, cancel: &AtomicBool::new(false), progress: None };
+    let options = BuildOptions {
+        threads: 0,
+        rays_expected: 1 << 40,
+        cancel: &AtomicBool::new(false),
+        memory_limit: None,
+        progress: None,
+    };
     AnyBackend::build(kind, &loaded.scene, &options).expect("a good scene")
 }
 

@@ -18,11 +18,13 @@ use tison::with_shapes;
 pub static NEVER: AtomicBool = AtomicBool::new(false);
 
 pub fn built(meshes: &[Arc<TriangleMesh>], quality: Quality) -> Native {
-    Native::build(&objects(meshes), &BuildOptions { quality, cancel: &NEVER }).expect("never cancelled")
+    Native::build(&objects(meshes), &BuildOptions { quality, cancel: &NEVER, memory_limit: None })
+        .expect("never cancelled")
 }
 
 pub fn build(objects: &[Object]) -> Native {
-    Native::build(objects, &BuildOptions { quality: Quality::Good, cancel: &NEVER }).expect("never cancelled")
+    Native::build(objects, &BuildOptions { quality: Quality::Good, cancel: &NEVER, memory_limit: None })
+        .expect("never cancelled")
 }
 
 pub fn objects(meshes: &[Arc<TriangleMesh>]) -> Vec<Object> {

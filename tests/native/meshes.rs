@@ -414,7 +414,7 @@ fn a_build_can_be_cancelled() {
     let objects = objects(&[mesh(&points, faces)]);
     let cancel = AtomicBool::new(true);
     for quality in [Quality::Good, Quality::Fast] {
-        let result = Native::build(&objects, &BuildOptions { quality, cancel: &cancel });
+        let result = Native::build(&objects, &BuildOptions { quality, cancel: &cancel, memory_limit: None });
         assert_eq!(result.err(), Some(BuildError::Cancelled));
     }
 }

@@ -35,7 +35,7 @@ proptest! {
         let mut numbers = Numbers(seed);
         let objects = scene(&mut numbers);
         let quality = if fast { Quality::Fast } else { Quality::Good };
-        let native = Native::build(&objects, &BuildOptions { quality, cancel: &AtomicBool::new(false) });
+        let native = Native::build(&objects, &BuildOptions { quality, cancel: &AtomicBool::new(false), memory_limit: None });
         let rays = rays(&mut numbers);
         let want: Vec<_> = rays.iter().map(|ray| loop_over(&objects, ray)).collect();
         check(&native.expect("never cancelled"), &rays, &want);
@@ -137,7 +137,8 @@ fn a_build_can_be_cancelled() {
     let mut scenes: Vec<Vec<Object>> = every_class(&all).into_iter().map(|set| vec![shapes(set)]).collect();
     scenes.push(all.iter().map(|&p| placed(&own, p)).collect());
     for objects in scenes {
-        let result = Native::build(&objects, &BuildOptions { quality: Quality::Good, cancel: &cancel });
+        let result =
+            Native::build(&objects, &BuildOptions { quality: Quality::Good, cancel: &cancel, memory_limit: None });
         assert_eq!(result.err(), Some(BuildError::Cancelled));
     }
 }

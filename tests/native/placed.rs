@@ -177,7 +177,7 @@ fn a_placement_that_cannot_be_undone_is_refused() {
     let nowhere = DAffine3::from_translation(DVec3::NAN);
     let error = |to_scene| {
         let objects = [placed(&own, DAffine3::IDENTITY), placed(&own, to_scene)];
-        Native::build(&objects, &BuildOptions { quality: Quality::Good, cancel: &NEVER }).err()
+        Native::build(&objects, &BuildOptions { quality: Quality::Good, cancel: &NEVER, memory_limit: None }).err()
     };
     let singular = ShapeError::Singular { volume: 0.0 };
     assert_eq!(error(flat), Some(BuildError::Transform { object: 1, source: singular }));

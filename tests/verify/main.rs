@@ -35,7 +35,7 @@ fn of_project(name: &str) -> (Scene, CameraDesc) {
 }
 
 fn native(scene: &Scene) -> Arc<Native> {
-    let options = BuildOptions { quality: Quality::Good, cancel: &GO_ON };
+    let options = BuildOptions { quality: Quality::Good, cancel: &GO_ON, memory_limit: None };
     Arc::new(Native::build(&scene.objects, &options).expect("a good scene"))
 }
 

@@ -1,7 +1,7 @@
 //! Both OBJ readers on the same file.
 
 use super::GO_ON;
-use tison::scene::Error;
+use tison::scene::{Error, FreeMemory};
 use tison::verify::readers::{Compared, compare};
 
 const V: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.3 0.1 0\nvn 0 0 2\nvt 0.25 0.75\n";
@@ -10,7 +10,7 @@ fn compared(text: impl AsRef<[u8]>) -> Result<Compared, Error> {
     let dir = tempfile::tempdir().expect("a temporary folder");
     let path = dir.path().join("a.obj");
     std::fs::write(&path, text).expect("it can be written");
-    compare(&path, &[], &GO_ON, || None)
+    compare(&path, &[], &GO_ON, FreeMemory::UNKNOWN)
 }
 
 #[track_caller]

@@ -7,6 +7,7 @@
 
 use super::bins::{BINS, Binning, Bins, Box4, Item, Plane};
 use super::bvh::{Apart, Block, Bvh, Child, HEURISTIC_DEPTH, MAX_THINGS, Node, WIDTH};
+use super::held::Held;
 use super::{BuildError, BuildOptions, Quality};
 use crate::geom::{BAD_FACE, Bounds, ShapeSet, TriangleMesh};
 use crate::scene::AnyShapes;
@@ -63,11 +64,10 @@ enum Part {
     Inner(Node, Vec<Part>),
 }
 
-struct Cancelled;
-
 struct Builder<'a> {
     quality: Quality,
     cancel: &'a AtomicBool,
+    held: &'a Held,
 }
 
 /// Number of the first thing of each source: all are counted through.
@@ -90,10 +90,19 @@ pub(super) fn owner(first: &[u32], id: u32) -> (u32, u32) {
 }
 
 /// Builds the hierarchy over all that can be hit; `first` is their [`numbers`].
-pub(super) fn build(sources: &[Source<'_>], first: &[u32], options: &BuildOptions<'_>) -> Result<Bvh, BuildError> {
-    let builder = Builder { quality: options.quality, cancel: options.cancel };
+///
+/// What it takes is counted in `held`, and what it gives back, but for the hierarchy itself.
+pub(super) fn build(
+    sources: &[Source<'_>],
+    first: &[u32],
+    options: &BuildOptions<'_>,
+    held: &Held,
+) -> Result<Bvh, BuildError> {
+    let builder = Builder { quality: options.quality, cancel: options.cancel, held };
+    let for_items = sources.iter().map(Source::len).sum::<usize>() * size_of::<Item>();
+    held.take(for_items)?;
     let mut items = items(sources, first);
-    let mut tree = builder.tree(&mut items).map_err(|Cancelled| BuildError::Cancelled)?;
+    let mut tree = builder.tree(&mut items)?;
     let items_of = |leaf: &LeafRange| &items[leaf.start as usize..][..leaf.count as usize];
     let is_apart = |leaf: &LeafRange| items_of(leaf)[0].is_apart();
     let block = |leaf: &LeafRange| {
@@ -112,9 +121,13 @@ pub(super) fn build(sources: &[Source<'_>], first: &[u32], options: &BuildOption
     };
     let only_meshes = sources.iter().all(|s| matches!(s, Source::Mesh(_)));
     let at = if only_meshes { tree.leaves.len() } else { tree.blocks_first(is_apart) };
+    // Joining took as much memory again, and the leaves are still to come.
+    builder.check()?;
     let (blocks, others) = tree.leaves.split_at(at);
+    held.take(blocks.len() * size_of::<Block>() + others.len() * size_of::<Apart>())?;
     let blocks = blocks.par_iter().with_min_len(TASK).map(block).collect();
     let apart = others.par_iter().with_min_len(TASK).map(apart).collect();
+    held.give(for_items + size_of_val(&tree.leaves[..]));
     Ok(Bvh { nodes: tree.nodes, blocks, apart, depth: tree.depth })
 }
 
@@ -151,7 +164,7 @@ fn items(sources: &[Source<'_>], first: &[u32]) -> Vec<Item> {
 }
 
 impl Builder<'_> {
-    fn tree(&self, items: &mut [Item]) -> Result<Subtree, Cancelled> {
+    fn tree(&self, items: &mut [Item]) -> Result<Subtree, BuildError> {
         if items.is_empty() {
             return Ok(Subtree::default());
         }
@@ -159,20 +172,28 @@ impl Builder<'_> {
         let mut tree = Subtree::default();
         if root.items.len() <= TASK {
             self.subtree(root, 1, &mut tree)?;
-        } else {
-            tree.take(self.part(root, 1)?, 1);
+            self.held.take(tree.bytes())?;
+            return Ok(tree);
         }
+        let part = self.part(root, 1)?;
+        // The parts go one by one as they are joined, but what they had may stay with the process until all have gone.
+        let bytes = part.bytes();
+        self.held.take(bytes)?;
+        tree.take(part, 1);
+        self.held.give(bytes);
         Ok(tree)
     }
 
     /// Builds what is below a node at `depth`, large subtrees in parallel.
-    fn part(&self, group: Group<'_>, depth: usize) -> Result<Part, Cancelled> {
+    fn part(&self, group: Group<'_>, depth: usize) -> Result<Part, BuildError> {
         if group.is_leaf() {
+            self.held.take(size_of::<LeafRange>())?;
             return Ok(Part::Leaf(group.leaf()));
         }
         if group.items.len() <= TASK {
             let mut tree = Subtree::default();
             self.subtree(group, depth, &mut tree)?;
+            self.held.take(tree.bytes())?;
             return Ok(Part::Done(tree));
         }
         self.check()?;
@@ -181,12 +202,13 @@ impl Builder<'_> {
         for (lane, child) in children.iter().enumerate() {
             node.set_bounds(lane, child.bounds);
         }
+        self.held.take(size_of::<Node>())?;
         let parts: Result<Vec<_>, _> = children.into_par_iter().map(|c| self.part(c, depth + 1)).collect();
         Ok(Part::Inner(node, parts?))
     }
 
     /// Builds a node for `group` and all below it, depth first.
-    fn subtree(&self, group: Group<'_>, depth: usize, out: &mut Subtree) -> Result<(), Cancelled> {
+    fn subtree(&self, group: Group<'_>, depth: usize, out: &mut Subtree) -> Result<(), BuildError> {
         self.check()?;
         let index = out.nodes.len();
         out.nodes.push(Node::EMPTY);
@@ -205,8 +227,8 @@ impl Builder<'_> {
         Ok(())
     }
 
-    fn check(&self) -> Result<(), Cancelled> {
-        if self.cancel.load(Ordering::Relaxed) { Err(Cancelled) } else { Ok(()) }
+    fn check(&self) -> Result<(), BuildError> {
+        if self.cancel.load(Ordering::Relaxed) { Err(BuildError::Cancelled) } else { Ok(()) }
     }
 
     /// Splits the group with the largest box until there are four, or only leaves.
@@ -253,7 +275,22 @@ fn cheapest_plane(group: &Group<'_>) -> Option<Plane> {
     bins.best(&binning, group.bounds.unit())
 }
 
+impl Part {
+    /// Bytes that it becomes.
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Leaf(_) => size_of::<LeafRange>(),
+            Self::Done(tree) => tree.bytes(),
+            Self::Inner(_, parts) => size_of::<Node>() + parts.iter().map(Self::bytes).sum::<usize>(),
+        }
+    }
+}
+
 impl Subtree {
+    fn bytes(&self) -> usize {
+        size_of_val(&self.nodes[..]) + size_of_val(&self.leaves[..])
+    }
+
     /// Gives the leaves for which `is_apart` the highest numbers; the first of those.
     fn blocks_first(&mut self, is_apart: impl Fn(&LeafRange) -> bool + Sync + Send) -> usize {
         let is_apart: Vec<bool> = self.leaves.par_iter().with_min_len(TASK).map(is_apart).collect();
@@ -387,8 +424,12 @@ mod tests {
     static NEVER: AtomicBool = AtomicBool::new(false);
 
     fn built(mesh: &TriangleMesh, quality: Quality) -> Bvh {
-        let options = BuildOptions { quality, cancel: &NEVER };
-        build(&[Source::Mesh(mesh)], &[0], &options).expect("never cancelled")
+        let options = BuildOptions { quality, cancel: &NEVER, memory_limit: None };
+        let held = Held::new(None);
+        let bvh = build(&[Source::Mesh(mesh)], &[0], &options, &held).expect("never cancelled");
+        held.give(bvh.bytes());
+        assert_eq!(held.now(), 0, "what is left is the hierarchy");
+        bvh
     }
 
     fn soup(triangles: impl Iterator<Item = [Vec3; 3]>) -> TriangleMesh {

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | `build`, `bins` | a hierarchy from boxes, in parallel |
 //! | `bvh` | a hierarchy in memory |
+//! | `held` | the memory that building takes |
 //! | `ray` | a ray prepared for boxes and triangles |
 //! | `traverse` | the way of a ray through a hierarchy |
 //! | `world` | the hierarchy of the scene; its shapes and placed meshes |
@@ -30,6 +31,7 @@ mod bins;
 mod build;
 mod bvh;
 mod exact;
+mod held;
 mod packet;
 mod placed;
 mod ray;
@@ -64,6 +66,8 @@ pub struct BuildOptions<'a> {
     pub quality: Quality,
     /// Once true, the build stops within milliseconds.
     pub cancel: &'a AtomicBool,
+    /// Bytes that the build may hold at once, the hierarchy included; `None` means no limit.
+    pub memory_limit: Option<u64>,
 }
 
 /// Why there is no hierarchy.
@@ -73,6 +77,14 @@ pub enum BuildError {
     /// [`BuildOptions::cancel`] was set.
     #[error("building the hierarchy was cancelled")]
     Cancelled,
+    /// It would hold more than [`BuildOptions::memory_limit`] allows.
+    #[error("the native hierarchy needs at least {needed} bytes while it is built, but may use only {limit}")]
+    OverBudget {
+        /// Bytes that would have been held at once when the limit stopped the build; it may need more.
+        needed: u64,
+        /// Bytes allowed.
+        limit: u64,
+    },
     /// More than it can number.
     #[error("{count} triangles and shapes in one scene are more than the native backend can number ({MAX_THINGS})")]
     TooMany {
@@ -103,7 +115,7 @@ impl Native {
     /// are copied, sets of shapes are shared. The trees are the same for any number of threads.
     ///
     /// # Errors
-    /// If it was cancelled, a placement cannot be undone, or there are 2^29 triangles and shapes
+    /// If it was cancelled or needs more memory than it may use, a placement cannot be undone, or there are 2^29 triangles and shapes
     /// and more.
     pub fn build(objects: &[Object], options: &BuildOptions<'_>) -> Result<Self, BuildError> {
         Ok(Self { world: World::build(objects, options)?, quality: options.quality })
@@ -126,6 +138,12 @@ impl Native {
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.world.bytes()
+    }
+
+    /// Most bytes that were held at once while they were built.
+    #[must_use]
+    pub fn peak_bytes(&self) -> u64 {
+        self.world.peak_bytes
     }
 }
 

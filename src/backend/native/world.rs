@@ -2,6 +2,7 @@
 
 use super::build::{Source, build, numbers, owner};
 use super::bvh::{Apart, Bvh, Child};
+use super::held::Held;
 use super::placed::Placed;
 use super::ray::Line;
 use super::traverse::{Best, SMALL_STACK, STACK, Slot, Space, Waiting, Walk};
@@ -35,19 +36,22 @@ pub(super) struct World {
     /// Most children that wait at once, in the scene and in a mesh.
     pub(super) stack_len: usize,
     pub(super) has_shapes: bool,
+    /// Most bytes that the builds held at once.
+    pub(super) peak_bytes: u64,
 }
 
 impl World {
     pub(super) fn build(objects: &[Object], options: &BuildOptions<'_>) -> Result<Self, BuildError> {
+        let held = Held::new(options.memory_limit);
         let (meshes, which) = placed_meshes(objects);
         let meshes = meshes.into_par_iter().map(|data| {
             let source = [Source::Mesh(&data.triangles)];
-            build(&source, &numbers(&source)?, options)
+            build(&source, &numbers(&source)?, options, &held)
         });
         let meshes: Vec<Bvh> = meshes.collect::<Result<_, _>>()?;
         let sources: Vec<_> = objects.iter().map(source).collect();
         let first = numbers(&sources)?;
-        let bvh = build(&sources, &first, options)?;
+        let bvh = build(&sources, &first, options, &held)?;
         let things = objects.iter().enumerate().map(|(object, o)| match o {
             Object::Mesh(_) => Ok(Thing::Mesh),
             Object::Shapes(shapes) => Ok(Thing::Shapes(shapes.set.clone())),
@@ -60,7 +64,7 @@ impl World {
         let things = things.collect::<Result<Vec<_>, _>>()?;
         let stack_len = bvh.stack_len() + meshes.iter().map(Bvh::stack_len).max().unwrap_or(0);
         let has_shapes = things.iter().any(|t| matches!(t, Thing::Shapes(_)));
-        Ok(Self { bvh, first, things, meshes, stack_len, has_shapes })
+        Ok(Self { bvh, first, things, meshes, stack_len, has_shapes, peak_bytes: held.peak() })
     }
 
     pub(super) fn bytes(&self) -> usize {

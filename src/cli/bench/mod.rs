@@ -19,7 +19,8 @@ use tison::film;
 pub enum Bench {
     /// Wrong answers, leaks and false shadows over distance, scale and place, and what accuracy costs
     Stability(StabilityArgs),
-    /// The native tracer against Embree: seconds to build and rays per second, by one thread and by all
+    /// The native tracer, Embree, and a bare loop over Embree: seconds to read and build, rays per second, whole renders,
+    /// over sizes and threads
     Speed(SpeedArgs),
     /// Run time against error of pictures: who needs how many samples and seconds, and how fast the error falls
     #[command(after_long_help = error::AFTER_HELP)]
@@ -62,18 +63,25 @@ pub struct SpeedArgs {
     /// Scenes or meshes to trace, instead of generated ones unless those are asked for too
     #[arg(value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// Triangles of generated meshes; 0 is none [default: 10000,100000,1000000,5000000]
+    /// Triangles of generated meshes; 0 is none [default: 10000,100000,1000000,10000000, for which the
+    /// temporary folder needs 1 GB]
     #[arg(
         long, value_name = "N,…", value_delimiter = ',', allow_negative_numbers = true,
         value_parser = clap::value_parser!(u64).range(..=100_000_000)
     )]
     triangles: Vec<u64>,
-    /// Spheres at random places; 0 is none [default: 10000,100000]
+    /// Spheres at random places; 0 is none [default: 10,1000,100000,1000000]
     #[arg(
         long, value_name = "N,…", value_delimiter = ',', allow_negative_numbers = true,
         value_parser = clap::value_parser!(u32).range(..=10_000_000)
     )]
     spheres: Vec<u32>,
+    /// Numbers of threads [default: 1, 2, 4 and so on, and all]
+    #[arg(
+        long, value_name = "N,…", value_delimiter = ',', allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u16).range(1..=1024)
+    )]
+    threads: Vec<u16>,
     /// Rounds, of which the medians count
     #[arg(
         long, value_name = "N", default_value = "5", allow_negative_numbers = true,
@@ -114,11 +122,12 @@ fn speed(args: &SpeedArgs, messages: &Messages) -> Result<Exit, Failure> {
         triangles: args.triangles.clone(),
         spheres: args.spheres.clone(),
         files: args.files.clone(),
+        threads: args.threads.iter().map(|&n| usize::from(n)).collect(),
         rounds: usize::from(args.rounds),
     };
     if options.files.is_empty() && options.triangles.is_empty() && options.spheres.is_empty() {
-        options.triangles = vec![10_000, 100_000, 1_000_000, 5_000_000];
-        options.spheres = vec![10_000, 100_000];
+        options.triangles = vec![10_000, 100_000, 1_000_000, 10_000_000];
+        options.spheres = vec![10, 1000, 100_000, 1_000_000];
     }
     options.triangles.retain(|&n| n > 0);
     options.spheres.retain(|&n| n > 0);

@@ -157,6 +157,7 @@ impl Run<'_> {
             // Nobody knows; a good hierarchy is soon worth it.
             rays_expected: u64::MAX,
             cancel: &self.control.cancel,
+            memory_limit: None,
             progress: Some(&report),
         };
         let scene: Scene = loaded.scene;

@@ -41,6 +41,7 @@ impl Run<'_, '_> {
             // Good hierarchies, as long renders have them.
             rays_expected: u64::MAX,
             cancel: &self.control.cancel,
+            memory_limit: None,
             progress: None,
         };
         AnyBackend::build(kind, scene, &options).map_err(|e| build_failure(&e))

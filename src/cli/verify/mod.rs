@@ -23,7 +23,7 @@ use std::time::Instant;
 use tison::film;
 use tison::math::Frame;
 use tison::render::Control;
-use tison::scene::{Loaded, MeshFormat};
+use tison::scene::{FreeMemory, Loaded, MeshFormat};
 use tison::verify::Report;
 use tison::verify::readers::{self, Compared};
 
@@ -167,7 +167,7 @@ impl<'a> Run<'a, '_> {
         let meshes = loaded.files.iter().filter(is_obj).filter(|path| path.is_file());
         let compare = |path: &PathBuf| {
             let (allow, cancel) = (&self.args.reading.allow_path, &self.control.cancel);
-            readers::compare(path, allow, cancel, system::available_memory).map_err(Failure::from)
+            readers::compare(path, allow, cancel, FreeMemory::new(&system::available_memory)).map_err(Failure::from)
         };
         meshes.map(compare).collect()
     }

@@ -36,6 +36,15 @@ impl Decoder {
         DynamicImage::from_decoder(decoder).map_err(|e| self.why(&e))
     }
 
+    /// Bytes of all pixels, as the head of the file has it.
+    pub fn decoded_bytes(&self, from: impl BufRead + Seek) -> Option<u64> {
+        let mut reader = ImageReader::new(from).with_guessed_format().ok()?;
+        let mut limits = Limits::no_limits();
+        limits.max_alloc = Some(self.most_memory);
+        reader.limits(limits);
+        Some(reader.into_decoder().ok()?.total_bytes())
+    }
+
     /// Refuses a side or a whole that is too large; `bytes` is what all pixels take.
     pub fn check_size(&self, (width, height): (u32, u32), bytes: u64) -> Result<(), String> {
         if width == 0 || height == 0 {

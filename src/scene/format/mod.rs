@@ -16,6 +16,7 @@ mod object;
 mod overrides;
 mod ray;
 mod reader;
+mod size;
 mod suggest;
 mod toml;
 mod tree;
@@ -25,6 +26,7 @@ pub use assets::{AssetError, resolve_asset};
 pub use diagnostic::{Diagnostic, Look, Severity};
 pub(super) use mistakes::Mistakes;
 pub use overrides::Override;
+pub(super) use size::memory_needed;
 pub use write::to_toml;
 
 use super::desc::{SceneDesc, ShapeDesc};

@@ -42,7 +42,7 @@ impl<'a> Assets<'a> {
 
     /// Reads the images that meshes named since there were `before`. One that cannot be used is a warning.
     pub fn read_images_of_meshes(&mut self, before: usize) -> Result<(), Error> {
-        self.images.read(self.options.cancel)?;
+        self.images.read(self.options)?;
         for slot in before..self.images.len() {
             if let Some((path, why)) = self.images.fault(slot) {
                 self.warnings.push(Warning::about(path, format!("the image {why}; Kd is used alone")));

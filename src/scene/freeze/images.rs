@@ -1,11 +1,11 @@
 //! The images of a scene: each file once for each way of looking it up, read by all threads.
 
-use crate::scene::Error;
 use crate::scene::texture::{self, Encoding, Texture};
+use crate::scene::{Error, LoadOptions};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Duration, Instant};
 
 /// Images that are wanted, read or not yet.
@@ -43,15 +43,19 @@ impl Images {
     }
 
     /// Reads what has not been read.
-    pub fn read(&mut self, cancel: &AtomicBool) -> Result<(), Error> {
+    pub fn read(&mut self, options: &LoadOptions<'_>) -> Result<(), Error> {
         let (start, encoding) = (Instant::now(), self.encoding);
-        self.slots.par_iter_mut().filter(|slot| slot.read.is_none()).for_each(|slot| {
-            if !cancel.load(Relaxed) {
-                slot.read = Some(texture::read(&slot.path, encoding, slot.nearest));
+        let read = self.slots.par_iter_mut().filter(|slot| slot.read.is_none()).try_for_each(|slot| {
+            if options.cancel.load(Relaxed) {
+                return Err(Error::Cancelled);
             }
+            let bytes = texture::decoded_bytes(&slot.path).unwrap_or(0);
+            options.free_memory.check(&slot.path, || "the image".into(), bytes)?;
+            slot.read = Some(texture::read(&slot.path, encoding, slot.nearest));
+            Ok(())
         });
         self.spent += start.elapsed();
-        if cancel.load(Relaxed) { Err(Error::Cancelled) } else { Ok(()) }
+        read
     }
 
     /// The file of a slot and why it cannot be used, if so.

@@ -34,12 +34,16 @@ use std::path::Path;
 
 /// Reads the scene file at `path` and all that it needs.
 pub fn load(path: &Path, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
+    let length = std::fs::metadata(path).map_or(0, |meta| meta.len());
+    options.free_memory.check(path, || "the text".into(), length)?;
     let text = std::fs::read(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
     load_text(path, text, options)
 }
 
 /// The same with `text` for the content of the file.
 pub fn load_text(path: &Path, text: Vec<u8>, options: &LoadOptions<'_>) -> Result<Loaded, Error> {
+    let needed = format::memory_needed(Format::of(path), &text);
+    options.free_memory.check(path, || "a scene of this length".into(), needed)?;
     let read = format::ReadOptions { overrides: options.overrides.clone(), allow: options.allow.clone() };
     let (desc, diagnostics, mistakes) = format::parse_keeping(path, &text, &read).map_err(Error::Scene)?;
     drop(text);
@@ -89,7 +93,7 @@ fn read_images(
     assets: &mut Assets<'_>,
     mistakes: &Mistakes,
 ) -> Result<(), Error> {
-    assets.images.read(assets.options.cancel)?;
+    assets.images.read(assets.options)?;
     let textures = palette.entries.iter().map(|entry| desc.materials[(*entry)?].texture.as_ref());
     let mut told = vec![false; assets.images.len()];
     for (texture, slot) in textures.zip(&plan.slots) {

@@ -30,8 +30,8 @@ pub use corners::CornerData;
 pub use mtl::MtlMaterial;
 pub(super) use notes::with_more;
 
-use super::source::{FreeMemory, Limits, Source};
-use super::{Error, Warning};
+use super::source::{Limits, Source};
+use super::{Error, FreeMemory, Warning};
 use crate::math::Frame;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -77,8 +77,8 @@ pub struct ReadOptions<'a> {
     pub allow: &'a [PathBuf],
     /// Reading stops soon after this becomes true.
     pub cancel: &'a AtomicBool,
-    /// Asked while a pipe or a compressed file is read into memory.
-    pub free_memory: FreeMemory,
+    /// Asked while a pipe or a compressed file is read into memory, and before the mesh is stored.
+    pub free_memory: FreeMemory<'a>,
     /// Told how many bytes are done, of how many, from any thread and not in order. As
     /// the file is gone over twice, that is twice its size.
     pub progress: Option<&'a (dyn Fn(u64, u64) + Sync)>,
@@ -107,7 +107,7 @@ impl<'a> ReadOptions<'a> {
             rests: false,
             allow: &[],
             cancel,
-            free_memory: || None,
+            free_memory: FreeMemory::UNKNOWN,
             progress: None,
         }
     }
@@ -200,7 +200,7 @@ pub struct Counts {
 /// the first line that cannot be understood, [`Error::NoFaces`] for a file with nothing to
 /// render, [`Error::Forbidden`] for a library or image outside the allowed folders,
 /// [`Error::TooMany`] beyond what 32-bit indices can count, [`Error::Broken`] and [`Error::NoRoom`] for what
-/// cannot be unpacked, [`Error::Cancelled`];
+/// cannot be unpacked, [`Error::TooLarge`] for what does not fit into memory, [`Error::Cancelled`];
 /// [`Error::SecondReader`] for what tobj cannot read, if it is asked.
 pub fn read(path: &Path, options: &ReadOptions<'_>) -> Result<ObjFile, Error> {
     read_source(&Source::open(path, options.limits())?, options)

@@ -44,6 +44,18 @@ pub(super) struct Plan {
     pub(super) uv: bool,
 }
 
+impl Plan {
+    /// Bytes of what the second pass fills.
+    pub(super) fn bytes(&self) -> u64 {
+        const TRIPLE: u64 = size_of::<[u32; 3]>() as u64;
+        let Tally { vertices, textures, normals, triangles, .. } = self.total;
+        let pair = TRIPLE / 3 * 2;
+        let of_normals = if self.normals { TRIPLE * (normals + triangles) } else { 0 };
+        let of_uv = if self.uv { pair * textures + TRIPLE * triangles } else { 0 };
+        TRIPLE * (vertices + triangles) + of_normals + of_uv
+    }
+}
+
 /// Whether corners have a value of a kind, and whether its index is their vertex's.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Usage {

@@ -33,6 +33,8 @@ pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Re
         uv: uv_wanted && total.textures > 0,
     };
 
+    let bytes = plan.bytes() + if options.rests { 12 * total.vertices } else { 0 };
+    options.free_memory.check_mesh(&source.path, total.triangles, bytes)?;
     let mut arrays = Arrays::new(&plan);
     let mut parsed = pieces.each(arrays.targets(&surveys), &surveys, |i, target, text, _| {
         parse::parse(text, pieces.ranges[i].start, before[i], &plan, target)

@@ -34,7 +34,8 @@ const PIECE: u64 = 1 << 18;
 /// [`Error::Read`] and [`Error::NotAFile`] for what is no readable file, [`Error::At`] for the first line of text that
 /// cannot be understood, [`Error::Broken`] for such a thing in a binary file or one that is too short,
 /// [`Error::NoFaces`] for a file with nothing to render, [`Error::TooMany`] beyond what 32-bit indices can count,
-/// [`Error::NoRoom`] for what is larger than memory when unpacked, [`Error::Cancelled`].
+/// [`Error::NoRoom`] for what is larger than memory when unpacked, [`Error::TooLarge`] for a mesh that is,
+/// [`Error::Cancelled`].
 pub fn read(path: &Path, options: &ReadOptions<'_>) -> Result<ObjFile, Error> {
     read_source(&Source::open(path, options.limits())?, options)
 }

@@ -143,6 +143,7 @@ impl Reader<'_> {
         let layout = self.vertices;
         let frame = Frame::fit(&self.sample(&parts)?);
         let count = layout.element.count as usize;
+        self.check_memory(layout)?;
         let room = |first, components| if layout.has(first) { vec![0.0; components * count] } else { Vec::new() };
         let (mut points, mut normals, mut uvs) = (vec![0.0; 3 * count + 1], room(NORMAL, 3), room(UV, 2));
         let targets = targets(&parts, &mut points, &mut normals, &mut uvs);
@@ -156,6 +157,19 @@ impl Reader<'_> {
         let tallies = parts.iter().zip(read).map(|(part, (_, long))| (part, long));
         let long = sum(tallies);
         Ok(Vertices { frame, points, normals, uvs, reach, long, parts })
+    }
+
+    /// Refuses a file whose vertices and faces do not fit into memory.
+    fn check_memory(&self, layout: &Layout<'_>) -> Result<(), Error> {
+        /// A count of one byte and three numbers of one byte: a header cannot promise more faces than that.
+        const SMALLEST_FACE: u64 = 4;
+        let File { source, options, .. } = self.file;
+        let numbers = 3 + [(NORMAL, 3), (UV, 2)].iter().map(|&(v, n)| if layout.has(v) { n } else { 0 }).sum::<u64>();
+        let rests = if options.rests { 3 } else { 0 };
+        let of_vertices = layout.element.count * 4 * (numbers + rests);
+        // Most files have no polygons with less than three corners.
+        let faces = self.faces.element.count.min(source.len / SMALLEST_FACE);
+        options.free_memory.check_mesh(&source.path, faces, of_vertices + 12 * faces)
     }
 
     /// Some vertices, evenly spread over all.
@@ -227,6 +241,8 @@ impl Reader<'_> {
     ) -> Result<(Vec<[u32; 3]>, Vec<Found>), Stop> {
         let count = parts.iter().map(|p| p.triangles).sum();
         obj::check_count(self.file.source, "triangles", count).map_err(Stop::Error)?;
+        let File { source, options, .. } = self.file;
+        options.free_memory.check_mesh(&source.path, count, 12 * count).map_err(Stop::Error)?;
         let mut faces = vec![[0; 3]; count as usize];
         let targets = cut(&mut faces, parts.iter().map(|p| p.triangles as usize));
         let vertices = self.vertices.element.count;

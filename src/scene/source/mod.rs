@@ -4,7 +4,7 @@ mod packed;
 
 pub use packed::{is_packed, unpacked_name};
 
-use super::Error;
+use super::{Error, FreeMemory};
 use memchr::memchr_iter;
 use std::fs::File;
 use std::io::{self, Read};
@@ -17,12 +17,9 @@ use std::sync::atomic::AtomicBool;
 pub(super) struct Limits<'a> {
     /// Reading stops soon after this becomes true.
     pub(super) cancel: &'a AtomicBool,
-    pub(super) free_memory: FreeMemory,
+    /// Asked again and again while a pipe or a compressed file is read into memory.
+    pub(super) free_memory: FreeMemory<'a>,
 }
-
-/// Tells how many bytes of memory can still be had; nothing where nobody knows. Asked again and again while a pipe
-/// or a compressed file is read into memory, which ends in an error when they are too few.
-pub type FreeMemory = fn() -> Option<u64>;
 
 /// A file that any thread may read a part of.
 #[derive(Debug)]

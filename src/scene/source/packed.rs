@@ -114,7 +114,7 @@ fn collect(
         }
         if bytes.capacity() - bytes.len() < STEP {
             let more = bytes.len().max(STEP);
-            let free = (limits.free_memory)();
+            let free = limits.free_memory.bytes();
             if free.is_some_and(|free| more as u64 > free) || bytes.try_reserve_exact(more).is_err() {
                 return Err(Error::NoRoom { path: path.to_owned(), read: bytes.len() as u64 });
             }
@@ -191,7 +191,7 @@ impl<R: BufRead> Read for Frames<R> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Source;
+    use super::super::{FreeMemory, Source};
     use super::*;
     use flate2::Compression;
     use flate2::write::GzEncoder;
@@ -200,7 +200,7 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     static GO_ON: AtomicBool = AtomicBool::new(false);
-    const LIMITS: Limits<'static> = Limits { cancel: &GO_ON, free_memory: || None };
+    const LIMITS: Limits<'static> = Limits { cancel: &GO_ON, free_memory: FreeMemory::UNKNOWN };
 
     fn gzip(bytes: &[u8]) -> Vec<u8> {
         let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
@@ -292,7 +292,8 @@ mod tests {
     fn what_does_not_fit_is_refused_and_reading_can_be_stopped() {
         let bomb = gzip(&vec![0; 64 << 20]);
         assert!(bomb.len() < 1 << 20);
-        let free = Limits { free_memory: || Some(10 << 20), ..LIMITS };
+        let ten = || Some(10 << 20);
+        let free = Limits { free_memory: FreeMemory::new(&ten), ..LIMITS };
         assert!(matches!(open("a.obj", &bomb, free), Err(Error::NoRoom { read, .. }) if read <= 32 << 20));
         assert_eq!(open("a.obj", &gzip(&vec![b' '; 9 << 20]), free).expect("it fits").len(), 9 << 20);
         let stop = AtomicBool::new(true);

@@ -28,6 +28,11 @@ pub fn read(path: &Path, encoding: Encoding, nearest: bool) -> Result<Texture, S
     Ok(texture(image, encoding, nearest))
 }
 
+/// Bytes of all pixels of the image at `path`, as its head has it; nothing of one that cannot be read.
+pub fn decoded_bytes(path: &Path) -> Option<u64> {
+    DECODER.decoded_bytes(BufReader::new(File::open(path).ok()?))
+}
+
 fn texture(image: DynamicImage, encoding: Encoding, nearest: bool) -> Texture {
     let size = (image.width(), image.height());
     match image {

@@ -4,7 +4,7 @@ mod decode;
 #[cfg(test)]
 mod tests;
 
-pub(super) use decode::read;
+pub(super) use decode::{decoded_bytes, read};
 
 use crate::math::colour;
 use glam::{Vec2, Vec3};

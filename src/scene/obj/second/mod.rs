@@ -39,6 +39,8 @@ pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Re
     check_size(&total, &pieces)?;
     let materials = Materials::of(&pieces, &surveys, &before, &total)?;
     let frame = Frame::fit(&sampling.merge(surveys.iter()));
+    // Points as tobj has them, in f64, and indices as it has them and as they are stored.
+    options.free_memory.check_mesh(&source.path, total.triangles, 24 * (total.vertices + total.triangles))?;
 
     let mut lines = Lines::new(&pieces);
     let models = tobj::load_obj_buf(&mut lines, &LOAD, |_| Ok(names(&materials.runs.names)));
