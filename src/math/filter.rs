@@ -159,8 +159,8 @@ struct Inverse {
 
 /// Largest error of a straight piece where it is looked at, its middle.
 const TOLERANCE: f64 = 2e-5;
-/// Room for nodes, of which there are some hundred.
-const NODES: usize = 512;
+/// Room for nodes, of which Mitchell's filter has 576.
+const NODES: usize = 1024;
 /// Steps from 0 to 1: more than there are nodes.
 const GUIDES: usize = 1024;
 

@@ -1,7 +1,5 @@
 //! Which shadow rays a light needs: none where it could add nothing, or is known to be hidden.
 
-#![expect(clippy::needless_range_loop, reason = "an index runs over many arrays at once")]
-
 use super::block::{Block, F32, F64};
 use super::lights;
 use crate::geom::{LANES, RayPacket};

@@ -67,7 +67,11 @@ pub fn left_out(skip: Skip, on: &Done, off: &Done) -> (u64, &'static str) {
         Skip::Normals => (work.smooth_blocks, more.smooth_blocks, "blocks of normals"),
         Skip::Lens => (work.lens_points, more.lens_points, "points of the lens"),
         Skip::Jitter => (work.pixel_points, more.pixel_points, "points of pixels"),
-        Skip::DarkLights | Skip::ShadowRays | Skip::Enclosed | Skip::FaintLights => {
+        Skip::DarkLights => {
+            let lit = |d: &Done| d.outcome.stats.work.highlights + d.outcome.stats.blocks_without_highlight;
+            (lit(on), lit(off), "blocks lit")
+        }
+        Skip::ShadowRays | Skip::Enclosed | Skip::FaintLights => {
             (stats.rays.shadow, without.rays.shadow, "shadow rays")
         }
         Skip::AnyHit => (work.nearest_occluders, more.nearest_occluders, "nearest hits"),

@@ -87,7 +87,9 @@ impl Subject {
             Skip::DarkLights => ("a dark light", balls().replace(MATERIALS, &format!("{DARK}{MATERIALS}")), job),
             Skip::ShadowRays => ("a black ball", with(BLACK, &[ball("shiny", -0.8), ball("black", 0.8)]), job),
             Skip::Enclosed | Skip::Inside => {
-                ("two glass balls", with(GLASS, &[ball("glass", -0.8), ball("glass", 0.8)]), job)
+                let balls = with(GLASS, &[ball("glass", -0.8), ball("glass", 0.8)]);
+                // Off the floor: they touch nothing.
+                ("two glass balls", balls.replace(", 0.7, 0]", ", 0.9, 0]"), job)
             }
             Skip::FaintLights => (
                 "two mirrors on a third",
