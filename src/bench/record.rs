@@ -1,7 +1,7 @@
 //! Rays of a render, kept as they reached the backend and asked again without the render around them.
 
 use crate::backend::Backend;
-use crate::geom::{Coherence, Hit, PacketBatch, Ray, RayHitPacket, RayPacket};
+use crate::geom::{Coherence, Hit, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
 use crate::render::{self, Control, Job, Outcome};
 use crate::scene::{CameraDesc, Scene};
 use rayon::ThreadPool;
@@ -11,17 +11,17 @@ use std::time::{Duration, Instant};
 /// A batch as it reached the backend.
 #[derive(Clone, Debug)]
 pub enum Recording {
-    /// What is the nearest hit?
-    Nearest(PacketBatch<RayHitPacket>),
+    /// What is the nearest hit? Rays that go alike or not.
+    Nearest(PacketBatch<RayHitPacket>, Coherence),
     /// Is anything in the way?
     Any(PacketBatch<RayPacket>),
 }
 
 impl Recording {
     fn rays(&self) -> usize {
+        // A lane that ends at minus infinity asks nothing.
         match self {
-            Self::Nearest(b) => b.len(),
-            // A lane that ends at minus infinity asks nothing.
+            Self::Nearest(b, _) => (0..b.len()).filter(|i| b.packets()[i / LANES].ray.t_far[i % LANES] > 0.0).count(),
             Self::Any(b) => b.packets().iter().flat_map(|p| p.t_far).filter(|&t| t > 0.0).count(),
         }
     }
@@ -113,7 +113,7 @@ impl<B: Backend> Backend for Recorder<'_, B> {
     }
 
     fn intersect_many(&self, rays: &mut PacketBatch<RayHitPacket>, coherence: Coherence) {
-        self.keep(Recording::Nearest(rays.clone()));
+        self.keep(Recording::Nearest(rays.clone(), coherence));
         self.inner.intersect_many(rays, coherence);
     }
 
@@ -129,7 +129,7 @@ mod tests {
     use crate::backend::{AnyBackend, BackendKind};
     use crate::bench::setup;
     use crate::scene::example::{self, Surface};
-    use crate::scene::{CameraOverrides, Mesh, Object, View};
+    use crate::scene::{CameraOverrides, Mesh, Object, Skip, Skips, View};
     use rayon::ThreadPoolBuilder;
 
     #[test]
@@ -141,7 +141,8 @@ mod tests {
         let built = setup::build(BackendKind::Native, &scene).expect("it is small");
         #[cfg_attr(not(feature = "embree"), expect(irrefutable_let_patterns, reason = "there is no other backend"))]
         let AnyBackend::Native(backend) = built else { unreachable!("it was asked for") };
-        let job = Job { k_max: 0, ..Job::whole((64, 48)) };
+        // Rays that pass the scene would not be asked.
+        let job = Job { k_max: 0, skips: Skips::ALL.without(Skip::Bounds), ..Job::whole((64, 48)) };
         let (tapes, outcome) = Tapes::of(&scene, &camera, &backend, &job, &pool).expect("a good camera");
         assert_eq!(tapes.rays() as u64, outcome.stats.rays.total());
         assert!(outcome.stats.rays.shadow > 100 && tapes.batches() > 4);
@@ -149,8 +150,8 @@ mod tests {
         tapes.replay(&pool, |recording| {
             let mut found = (0, 0);
             match recording {
-                Recording::Nearest(batch) => {
-                    backend.intersect_many(batch, Coherence::Coherent);
+                Recording::Nearest(batch, coherence) => {
+                    backend.intersect_many(batch, *coherence);
                     let live = |i: &usize| batch.packets()[i / 16].hit(i % 16).is_some();
                     found.0 = (0..batch.len()).filter(live).count();
                 }

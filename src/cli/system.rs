@@ -40,7 +40,8 @@ mod tests {
     #[cfg(target_os = "linux")]
     fn this_process_holds_some_memory_and_less_than_there_is() {
         let peak = peak_memory().unwrap();
-        assert!(resident_memory().unwrap() <= peak);
+        // The kernel adds up each in its own time: one may be ahead of the other.
+        assert!((100_000..=2 * peak).contains(&resident_memory().unwrap()));
         assert!(peak > 100_000 && peak < available_memory().unwrap() * 100, "{peak}");
     }
 }

@@ -49,7 +49,7 @@ impl PixelSum {
         if self.counted < 2 { 0.0 } else { self.deviation / (3.0 * n * (n - 1.0)) }
     }
 
-    /// Adds samples, at most a packet's worth, in their order.
+    /// Adds samples in their order.
     pub fn add(&mut self, samples: &[DVec3], deviations: bool) {
         self.taken += samples.len() as u32;
         if !deviations {
@@ -59,15 +59,17 @@ impl PixelSum {
             }
             return;
         }
-        let before = *self;
-        let (mut colors, mut count) = ([DVec3::ZERO; LANES], 0);
-        for color in samples.iter().filter_map(|s| kept(*s)) {
-            self.color += color;
-            colors[count] = color;
-            count += 1;
+        for part in samples.chunks(LANES) {
+            let before = *self;
+            let (mut colors, mut count) = ([DVec3::ZERO; LANES], 0);
+            for color in part.iter().filter_map(|s| kept(*s)) {
+                self.color += color;
+                colors[count] = color;
+                count += 1;
+            }
+            self.counted += count as u32;
+            self.deviate(&before, colors[..count].iter().copied());
         }
-        self.counted += count as u32;
-        self.deviate(&before, colors[..count].iter().copied());
     }
 
     /// Adds samples that count as much as their weights say.

@@ -5,15 +5,23 @@
 //!     cargo bench --bench bare -- [MODEL.obj] [--size WxH] [--eye x,y,z] [--target x,y,z]
 //!                                 [--fov D] [--threads N] [--rounds N] [--triangles N]
 //!
-//! Without a model a displaced sphere is generated.
+//!                                 [--recursion N] [--min-weight W]
+//!
+//! Without a model a displaced sphere is generated. A scene file brings its own camera and lights; rays that have bounced
+//! (`--recursion`, 0 unless told) are replayed one by one, and where its plain spheres are all that it has besides boxes,
+//! also through a hierarchy of Embree's own spheres and triangles.
 use glam::DVec3;
 use rayon::ThreadPoolBuilder;
+use std::hint::black_box;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use tison::backend::{AnyBackend, BackendKind, BuildOptions};
 use tison::bench::record::{Recording, Tapes};
+use tison::embree::{self, Bare, Device, DeviceConfig, SceneBuilder, SceneOptions};
+use tison::geom::{Bounds, Coherence, ShapeSet, TriangleMesh};
 use tison::render::{self, Control, Job};
-use tison::scene::{self, CameraOverrides, LoadOptions, Projection, View};
+use tison::scene::{self, AnyShapes, CameraOverrides, LoadOptions, Object, Projection, Scene, Skip, Skips, View};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let args = Args::parse()?;
@@ -22,11 +30,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let model = args.model()?;
     let cancel = AtomicBool::new(false);
     let options = LoadOptions::new(&cancel);
-    let mut scene = scene::load(&model, &options)?.scene;
+    let loaded = scene::load(&model, &options)?;
+    let mut scene = loaded.scene;
     let aspect = f64::from(args.size.0) / f64::from(args.size.1);
-    let camera = scene.auto_camera(View::ThreeQuarter, &args.camera, aspect)?;
-    scene.light_from(&camera);
-    let job = Job { k_max: 0, ..Job::whole(args.size) };
+    let camera = match loaded.cameras.first() {
+        Some(named) => named.camera,
+        None => {
+            let camera = scene.auto_camera(View::ThreeQuarter, &args.camera, aspect)?;
+            scene.light_from(&camera);
+            camera
+        }
+    };
+    // The bare loop is asked about rays that pass the scene too.
+    let skips = Skips::ALL.without(Skip::Bounds);
+    let job = Job { k_max: args.recursion, min_weight: args.min_weight, skips, ..Job::whole(args.size) };
     let build = BuildOptions {
         threads,
         rays_expected: 3 * u64::from(args.size.0) * u64::from(args.size.1),
@@ -37,39 +54,94 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let backend = pool.install(|| AnyBackend::build(BackendKind::Embree, &scene, &build))?;
     let AnyBackend::Embree(embree) = &backend else { unreachable!("it was asked for") };
     let (tapes, _) = Tapes::of(&scene, &camera, embree, &job, &pool)?;
-    let (rays, bare) = (tapes.rays(), embree.scene().bare());
+    let rays = tapes.rays();
+    let own = own_spheres(&scene, threads)?;
     println!(
         "{} triangles, {rays} rays in {} batches, {threads} threads, {}",
         scene.counts().triangles,
         tapes.batches(),
         backend.details()
     );
-    println!("round   render Mrays/s   bare Mrays/s   ratio");
-    let mut ratios = Vec::new();
-    let (mut best_render, mut best_bare) = (0f64, 0f64);
+    println!("round   render Mrays/s   bare Mrays/s   ratio   Embree's own spheres   ratio");
+    let (mut ratios, mut to_own) = (Vec::new(), Vec::new());
     for round in 0..=args.rounds {
         let outcome = pool.install(|| render::run(&scene, &camera, &backend, &job, &Control::default()))?;
-        assert_eq!(outcome.stats.rays.total() as usize, rays, "both trace the same rays");
-        let spent = tapes.replay(&pool, |recording| match recording {
-            Recording::Nearest(batch) => bare.intersect_batch(batch),
-            Recording::Any(batch) => bare.occluded_batch(batch),
-        });
-        let bare = rays as f64 / spent.as_secs_f64() / 1e6;
+        let sent = outcome.stats.rays.total() - outcome.stats.rays_inside;
+        assert_eq!(sent as usize, rays, "both trace the same rays");
+        let rate = |scene: &embree::Scene| {
+            let spent = tapes.replay(&pool, |recording| replay(recording, scene.bare()));
+            rays as f64 / spent.as_secs_f64() / 1e6
+        };
+        let (bare, own) = (rate(embree.scene()), own.as_ref().map(rate));
         let ours = rays as f64 / outcome.stats.seconds / 1e6;
         if round == 0 {
             continue; // warms the caches
         }
-        println!("{round:5} {ours:16.2} {bare:14.2} {:7.3}", ours / bare);
+        print!("{round:5} {ours:16.2} {bare:14.2} {:7.3}", ours / bare);
+        println!("{}", own.map_or(String::new(), |own| format!(" {own:22.2} {:7.3}", ours / own)));
         ratios.push(ours / bare);
-        best_render = best_render.max(ours);
-        best_bare = best_bare.max(bare);
+        to_own.extend(own.map(|own| ours / own));
     }
-    ratios.sort_by(f64::total_cmp);
-    println!(
-        "median of ratios {:.3}; best render {best_render:.2}, best bare {best_bare:.2} Mrays/s",
-        ratios[ratios.len() / 2]
-    );
+    for (name, mut ratios) in [("bare loop", ratios), ("Embree's own spheres", to_own)] {
+        ratios.sort_by(f64::total_cmp);
+        if let Some(median) = ratios.get(ratios.len() / 2) {
+            println!("median of ratios to the {name}: {median:.3}");
+        }
+    }
     Ok(())
+}
+
+/// Asks again as the render asked: packets, or one by one where rays go apart.
+fn replay(recording: &mut Recording, bare: Bare<'_>) {
+    match recording {
+        Recording::Nearest(batch, Coherence::Coherent) => bare.intersect_batch(batch),
+        Recording::Nearest(batch, Coherence::Incoherent) => {
+            for (packet, live) in batch.packets_mut() {
+                for lane in (0..live).filter(|&lane| packet.ray.t_far[lane] > 0.0) {
+                    black_box(bare.intersect(&packet.ray.get(lane)));
+                }
+            }
+        }
+        Recording::Any(batch) => bare.occluded_batch(batch),
+    }
+}
+
+/// The spheres of a scene as Embree has them and its boxes as triangles, if it has spheres and nothing else.
+fn own_spheres(scene: &Scene, threads: usize) -> Result<Option<embree::Scene>, Box<dyn std::error::Error>> {
+    let device = Device::new(&DeviceConfig { threads, ..DeviceConfig::default() })?;
+    let mut builder = SceneBuilder::new(&device, SceneOptions::default())?;
+    let mut any = false;
+    for object in &scene.objects {
+        let Object::Shapes(shapes) = object else { return Ok(None) };
+        match &shapes.set {
+            AnyShapes::Spheres(set) => {
+                let sphere = |i| set.get(i).center().extend(set.get(i).radius()).as_vec4().to_array();
+                builder.own_spheres(&(0..set.len()).map(sphere).collect::<Vec<_>>())?;
+                any = true;
+            }
+            AnyShapes::Cubes(set) => {
+                let boxes: Vec<Bounds> = (0..set.len()).map(|i| set.bounds(i)).collect();
+                builder.mesh(Arc::new(triangles(&boxes)))?;
+            }
+            _ => return Ok(None),
+        }
+    }
+    Ok(if any { Some(builder.commit(None)?) } else { None })
+}
+
+fn triangles(boxes: &[Bounds]) -> TriangleMesh {
+    let (mut points, mut faces) = (Vec::new(), Vec::new());
+    for b in boxes {
+        let first = (points.len() / 3) as u32;
+        for corner in 0..8 {
+            let at = |k: usize| if corner >> k & 1 == 0 { b.lo[k] } else { b.hi[k] } as f32;
+            points.extend([at(0), at(1), at(2)]);
+        }
+        for [p, q, r, s] in [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]] {
+            faces.extend([[p, q, r], [p, r, s]].map(|face: [u32; 3]| face.map(|i| first + i)));
+        }
+    }
+    TriangleMesh::new(points, faces)
 }
 
 struct Args {
@@ -79,6 +151,8 @@ struct Args {
     camera: CameraOverrides,
     threads: usize,
     rounds: usize,
+    recursion: u32,
+    min_weight: f32,
 }
 
 impl Args {
@@ -90,6 +164,8 @@ impl Args {
             camera: CameraOverrides::default(),
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             rounds: 7,
+            recursion: 0,
+            min_weight: 1.0 / 1024.0,
         };
         let mut args = std::env::args().skip(1).filter(|a| a != "--bench");
         while let Some(arg) = args.next() {
@@ -104,6 +180,8 @@ impl Args {
                 "--target" => out.camera.target = Some(point(&value()?)?),
                 "--fov" => out.camera.projection = Some(Projection::Perspective { fov_deg: value()?.parse()? }),
                 "--threads" => out.threads = value()?.parse()?,
+                "--recursion" => out.recursion = value()?.parse()?,
+                "--min-weight" => out.min_weight = value()?.parse()?,
                 "--rounds" => out.rounds = value()?.parse()?,
                 "--triangles" => out.triangles = value()?.parse()?,
                 flag if flag.starts_with('-') => return Err(format!("unknown flag {flag}").into()),

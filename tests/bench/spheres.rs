@@ -82,6 +82,7 @@ fn compare(device: &Device, centers: &[DVec3], radius: f64, args: &Args) -> Resu
     row("camera", args, &camera, nearest, |b| own.intersect_16(b));
     row("shadow", args, &shadow, |b| ours.occluded_batch(b, coherent), |b| own.occluded_16(b));
     row("bounced, sorted", args, &bounced, nearest, |b| own.intersect_16(b));
+    row("bounced, single", args, &bounced, |b| ours.intersect_batch(b, Coherence::Incoherent), |b| own.intersect_1(b));
     row("random, single", args, &random, |b| ours.intersect_batch(b, Coherence::Incoherent), |b| own.intersect_1(b));
     Ok(())
 }

@@ -8,7 +8,7 @@ use tison::bench::leaving::{job, load, looking};
 use tison::bench::setup::build;
 use tison::geom::{Coherence, Hit, PacketBatch, Ray, RayHitPacket};
 use tison::render::{self, Control, Job, Outcome};
-use tison::scene::{CameraDesc, Loaded};
+use tison::scene::{CameraDesc, Loaded, Skip, Skips};
 
 fn written(text: &str) -> Loaded {
     let folder = tempfile::tempdir().expect("a folder");
@@ -44,7 +44,9 @@ impl Backend for Watching<'_> {
 fn watched(kind: BackendKind, loaded: &Loaded, camera: &CameraDesc, job: &Job) -> (Vec<(Ray, bool)>, Outcome) {
     let backend = build(kind, &loaded.scene).expect("a good scene");
     let watching = Watching { inner: backend.as_dyn(), rays: Mutex::default() };
-    let outcome = render::run_with(&loaded.scene, camera, &watching, job, &Control::default());
+    // All rays are to reach the backend.
+    let job = Job { skips: Skips::ALL.without(Skip::Inside).without(Skip::Bounds), ..job.clone() };
+    let outcome = render::run_with(&loaded.scene, camera, &watching, &job, &Control::default());
     (watching.rays.into_inner().expect("nobody panics with it"), outcome.expect("a good camera"))
 }
 

@@ -8,7 +8,7 @@ use crate::bench::record::{Recording, Tapes};
 use crate::geom::{LANES, PacketBatch, Ray, RayHitPacket, RayPacket, RayQueue};
 use crate::math::Random;
 use crate::render::{self, Control, Job, Surfaces};
-use crate::scene::Scene;
+use crate::scene::{Scene, Skip, Skips};
 use glam::{DVec2, DVec3};
 use rayon::ThreadPool;
 use rayon::prelude::*;
@@ -136,7 +136,8 @@ fn rays_from_hits(scene: &Scene, backend: &dyn Backend, camera: &[Ray]) -> (Vec<
 /// Embree.
 pub(super) fn renders(sight: &Sight, trio: &Trio, pool: &ThreadPool, rounds: usize) -> Result<Vec<Round>, Error> {
     let (scene, camera) = (&sight.scene, &sight.camera);
-    let job = Job { k_max: 0, ..Job::whole((RENDERED, RENDERED)) };
+    // The bare loop is asked about rays that pass the scene too.
+    let job = Job { k_max: 0, skips: Skips::ALL.without(Skip::Bounds), ..Job::whole((RENDERED, RENDERED)) };
     let tapes: Option<Tapes> = match &trio.embree {
         #[cfg(feature = "embree")]
         Some(AnyBackend::Embree(embree)) => {
@@ -153,7 +154,7 @@ pub(super) fn renders(sight: &Sight, trio: &Trio, pool: &ThreadPool, rounds: usi
     let replayed = || {
         let (tapes, bare) = (tapes.as_ref()?, bare.as_deref()?);
         let spent = tapes.replay(pool, |recording| match recording {
-            Recording::Nearest(batch) => bare.nearest(batch),
+            Recording::Nearest(batch, _) => bare.nearest(batch),
             Recording::Any(batch) => bare.any(batch),
         });
         Some(tapes.rays() as f64 / spent.as_secs_f64() / 1e6)
