@@ -22,7 +22,7 @@ impl Recording {
         // A lane that ends at minus infinity asks nothing.
         match self {
             Self::Nearest(b, _) => (0..b.len()).filter(|i| b.packets()[i / LANES].ray.t_far[i % LANES] > 0.0).count(),
-            Self::Any(b) => b.packets().iter().flat_map(|p| p.t_far).filter(|&t| t > 0.0).count(),
+            Self::Any(b) => (0..b.len()).filter(|i| b.packets()[i / LANES].t_far[i % LANES] > 0.0).count(),
         }
     }
 }

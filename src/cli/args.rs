@@ -293,7 +293,8 @@ pub struct PictureArgs {
     /// Chooses the samples: the same seed gives the same bytes [default: 0]
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Quality")]
     pub seed: Option<u32>,
-    /// Do not trace branches that weigh less; 0 traces the whole tree [default: 1/1024; 0 for .ray]
+    /// Do not trace branches that weigh less, nor, after a bounce, shadows of lights that add less than a sixteenth of it; 0
+    /// traces the whole tree [default: 1/1024; 0 for .ray]
     #[arg(
         long, value_name = "W", value_parser = parse::weight, allow_negative_numbers = true,
         help_heading = "Quality"

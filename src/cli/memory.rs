@@ -143,9 +143,12 @@ mod tests {
     fn growing_past_the_limit_stops_the_run() {
         let control = Arc::new(Control::default());
         let held = system::resident_memory().expect("Linux says it");
-        let memory = Memory::watch(Some(held + (64 << 20)), &control).expect("it fits");
-        assert!(memory.check().is_ok() && memory.free().expect("known") <= 64 << 20);
-        let ballast = vec![1u8; 256 << 20];
+        let limit = held + (128 << 20);
+        let memory = Memory::watch(Some(limit), &control).expect("it fits");
+        assert!(memory.check().is_ok());
+        // Other tests of this process come and go: what is held may have become less.
+        assert!(memory.free().expect("known") <= limit);
+        let ballast = vec![1u8; 384 << 20];
         while !control.is_cancelled() {
             std::thread::sleep(TICK);
         }
