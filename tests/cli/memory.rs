@@ -164,14 +164,11 @@ fn a_build_that_grows_past_the_limit_is_stopped_and_one_that_does_not_is_not() {
     for backend in ["embree", "native"].into_iter().filter(|b| *b == "native" || cfg!(feature = "embree")) {
         let words = format!("big.ply --size 16x16 --spp 4096 --no-error-estimate -j 1 --backend {backend}");
         let (peak, hierarchy) = around(&bench, &words);
-        // Less than it takes, and more than was known for sure before.
+        // Less than it takes, and more than was known for sure before, which is less of a native one.
+        let short = if backend == "native" { 0.25 } else { 0.05 } * hierarchy;
         let words = format!("{words} -o out.png --max-memory");
         // The hierarchy's own count comes to its end first, or the system's of the process.
-        refused(
-            &bench,
-            &format!("{words} {}", (peak - 0.05 * hierarchy) as u64),
-            &[" needs at least |memory grew to "],
-        );
+        refused(&bench, &format!("{words} {}", (peak - short) as u64), &[" needs at least |memory grew to "]);
         let enough = peak + 0.25 * hierarchy;
         bench.expect(&format!("{words} {} --stats s.json", enough as u64), 0);
         assert!(bytes(&json(&bench.read("s.json"))["peak_rss_bytes"]) <= enough, "{backend}");
