@@ -471,10 +471,18 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         let blocks = std::mem::take(&mut self.blocks);
         for block in &blocks[..self.used] {
             self.tally.work.hits_asked_on += block.len as u64;
-            let branches = |lane: &usize| self.branching[block.material[*lane] as usize];
-            let lanes: u32 = (0..block.len).filter(branches).map(|lane| 1 << lane).sum();
-            if lanes != 0 {
-                self.branch_block(block, lanes);
+            let mut sending = 0;
+            for lane in (0..block.len).filter(|&lane| self.branching[block.material[lane] as usize]) {
+                if block.depth[lane] < self.job.k_max {
+                    sending |= 1 << lane;
+                    continue;
+                }
+                let material = &self.scene.materials[block.material[lane] as usize];
+                let most = Block::vec3(&block.weight, lane).max_element() * material.passed_on();
+                self.gathered.leave_out(block.slot[lane], most, self.known.radiance.beyond());
+            }
+            if sending != 0 {
+                self.branch_block(block, sending);
             }
         }
         self.blocks = blocks;
@@ -484,11 +492,6 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         self.onwards.find(self.scene, &self.known.contacts, &mut self.media, block, branching);
         for lane in lanes(branching) {
             let path = block.path(lane);
-            if path.depth >= self.job.k_max {
-                let most = path.weight.max_element() * self.scene.materials[block.material[lane] as usize].passed_on();
-                self.gathered.leave_out(path.slot, most, self.known.radiance.beyond());
-                continue;
-            }
             let sent = self.onwards.lane(self.scene, block, lane);
             if let Some(branch) = sent.reflected.and_then(|b| self.worth_sending(&path, b)) {
                 self.tally.rays.reflected += 1;

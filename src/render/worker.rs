@@ -89,7 +89,7 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
 
     fn trace(&mut self, pixels: &mut Pixels, samples: Range<u32>, sampling: &Sampling) -> bool {
         let control = self.render.control;
-        let rays = if SECONDARY { tile::WIDE_SEGMENT } else { tile::SEGMENT };
+        let rays = if SECONDARY && self.render.job.k_max > 0 { tile::WIDE_SEGMENT } else { tile::SEGMENT };
         let mut first_pixel = 0;
         let last = samples.end;
         let Pixels { at, sums, hits } = pixels;
