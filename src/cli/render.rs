@@ -520,10 +520,7 @@ fn merge(all: &mut RenderStats, one: &RenderStats, index: u32) {
     all.rays_for_estimate += one.rays_for_estimate;
     all.sampling_rmse = root_mean_square(all.sampling_rmse, one.sampling_rmse, index);
     all.adapted = one.adapted.map(|one| after(all.adapted, one));
-    all.rays.camera += one.rays.camera;
-    all.rays.shadow += one.rays.shadow;
-    all.rays.reflected += one.rays.reflected;
-    all.rays.refracted += one.rays.refracted;
+    all.rays.add(&one.rays);
     all.cut_off_max = all.cut_off_max.max(one.cut_off_max);
     all.cut_off_is_estimate |= one.cut_off_is_estimate;
     all.cut_off_mean += (one.cut_off_mean - all.cut_off_mean) / f64::from(index + 1);

@@ -52,6 +52,8 @@ pub struct Asked {
     pub enclosed: u32,
     /// No ray: the light would add less than [`Rules::faint`].
     pub faint: u32,
+    /// Whether highlights were computed.
+    pub power: bool,
 }
 
 /// Shadow rays from a block to the middle of a light, and what the light would add: `t_far` is minus
@@ -65,12 +67,14 @@ pub fn at_center(
     shine: &mut Shine,
 ) -> Asked {
     let view = &lights::view(block, seen_from);
-    match (rules.power || lights::shines(block), light.falloff.is_some()) {
+    let power = rules.power || lights::shines(block);
+    let asked = match (power, light.falloff.is_some()) {
         (false, false) => simd::run(AtCenter::<false, false> { block, light, view, rules, packet, shine }),
         (false, true) => simd::run(AtCenter::<false, true> { block, light, view, rules, packet, shine }),
         (true, false) => simd::run(AtCenter::<true, false> { block, light, view, rules, packet, shine }),
         (true, true) => simd::run(AtCenter::<true, true> { block, light, view, rules, packet, shine }),
-    }
+    };
+    Asked { power, ..asked }
 }
 
 /// Shadow rays from the lanes `wanted` of a block to one point each, where that is not behind the
@@ -221,7 +225,7 @@ mod tests {
     fn a_highlight_too_narrow_to_be_seen_needs_no_ray() {
         let mut b = block();
         (b.diffuse, b.specular, b.shininess) = ([[0.0; LANES]; 3], [[1.0; LANES]; 3], [1000.0; LANES]);
-        assert_eq!(asked(&b, DVec3::new(1.0, 0.2, 0.0), ALL).0, Asked::default(), "less than any float above 0");
+        assert_eq!(asked(&b, DVec3::new(1.0, 0.2, 0.0), ALL).0.sent, 0, "less than any float above 0");
         assert_eq!(asked(&b, DVec3::new(0.01, 1.0, 0.0), ALL).0.sent, 1);
     }
 

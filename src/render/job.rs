@@ -203,6 +203,14 @@ pub struct RayCounts {
 }
 
 impl RayCounts {
+    /// Adds what another thread or frame sent.
+    pub fn add(&mut self, o: &Self) {
+        self.camera += o.camera;
+        self.shadow += o.shadow;
+        self.reflected += o.reflected;
+        self.refracted += o.refracted;
+    }
+
     /// All of them.
     #[must_use]
     pub fn total(&self) -> u64 {

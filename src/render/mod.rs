@@ -222,10 +222,7 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
 
 impl Tally {
     fn add(&mut self, o: &Self) {
-        self.rays.camera += o.rays.camera;
-        self.rays.shadow += o.rays.shadow;
-        self.rays.reflected += o.rays.reflected;
-        self.rays.refracted += o.rays.refracted;
+        self.rays.add(&o.rays);
         self.facing_away += o.facing_away;
         self.enclosed += o.enclosed;
         self.faint += o.faint;

@@ -441,10 +441,8 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
 
     /// Counts the shadow rays that block `index` did not need, in each of `rounds`, and bounds what was left out.
     fn note(&mut self, index: usize, asked: Asked, rounds: u64) {
-        let dull = !lights::shines(&self.blocks[index]);
-        let power = !dull || !self.job.skips.has(Skip::Powf);
-        self.tally.dull += u64::from(!power);
-        self.tally.work.highlights += u64::from(power);
+        self.tally.dull += u64::from(!asked.power);
+        self.tally.work.highlights += u64::from(asked.power);
         if self.job.skips.has(Skip::ShadowRays) {
             let count = |lanes: u32| rounds * u64::from(lanes.count_ones());
             self.tally.facing_away += count(asked.facing_away);
