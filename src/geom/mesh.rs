@@ -1,6 +1,7 @@
 //! A triangle mesh as both backends read it: stored once, in f32, padded as Embree asks.
 
-use super::Bounds;
+use super::{Bounds, LANES};
+use crate::simd::{self, Kernel};
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -202,14 +203,88 @@ fn whole(p: &[f32], rest: &[f32]) -> DVec3 {
 const CHUNK: usize = 1 << 14;
 
 fn inspect_all(points: &[f32], faces: &mut [[u32; 3]]) -> (Faults, Bounds) {
-    let parts = faces.par_chunks_mut(CHUNK).map(|chunk| inspect(points, chunk));
+    let parts = faces.par_chunks_mut(CHUNK).map(|faces| simd::run(Inspect { points, faces }));
     parts.reduce(|| (Faults::default(), Bounds::EMPTY), |a, b| (a.0.plus(b.0), a.1.union(b.1)))
 }
 
-fn inspect(points: &[f32], faces: &mut [[u32; 3]]) -> (Faults, Bounds) {
+/// Finds the faces that can never be hit, and the box around the others.
+struct Inspect<'a> {
+    points: &'a [f32],
+    faces: &'a mut [[u32; 3]],
+}
+
+impl Kernel for Inspect<'_> {
+    type Output = (Faults, Bounds);
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let mut faults = Faults::default();
+        let (mut lo, mut hi) = ([[f32::INFINITY; LANES]; 3], [[f32::NEG_INFINITY; LANES]; 3]);
+        let mut bounds = Bounds::EMPTY;
+        let (many, rest) = self.faces.as_chunks_mut::<LANES>();
+        for faces in many {
+            let mut corners = [[[0f32; LANES]; 3]; 3];
+            if gather(self.points, faces, &mut corners) && are_good(&corners) {
+                widen(&corners, &mut lo, &mut hi);
+            } else {
+                inspect(self.points, faces, &mut faults, &mut bounds);
+            }
+        }
+        inspect(self.points, rest, &mut faults, &mut bounds);
+        let ends = |of: &[[f32; LANES]; 3], end: fn(f32, f32) -> f32| {
+            DVec3::from_array([0, 1, 2].map(|k| of[k].into_iter().reduce(end).unwrap_or(0.0).into()))
+        };
+        (faults, bounds.union(Bounds { lo: ends(&lo, f32::min), hi: ends(&hi, f32::max) }))
+    }
+}
+
+/// The corners of faces, if they have all of them.
+#[inline(always)]
+fn gather(points: &[f32], faces: &[[u32; 3]; LANES], corners: &mut [[[f32; LANES]; 3]; 3]) -> bool {
+    for (lane, face) in faces.iter().enumerate() {
+        for (corner, &i) in corners.iter_mut().zip(face) {
+            let Some(p) = points.get(3 * i as usize..).and_then(|p| p.first_chunk::<3>()) else { return false };
+            for k in 0..3 {
+                corner[k][lane] = p[k];
+            }
+        }
+    }
+    true
+}
+
+/// Whether all of them can be hit.
+#[inline(always)]
+fn are_good([a, b, c]: &[[[f32; LANES]; 3]; 3]) -> bool {
+    let mut good = [true; LANES];
+    for i in 0..LANES {
+        let edge = |to: &[[f32; LANES]; 3], k: usize| f64::from(to[k][i]) - f64::from(a[k][i]);
+        let (u, v) = ([0, 1, 2].map(|k| edge(b, k)), [0, 1, 2].map(|k| edge(c, k)));
+        let flat = (u[1] * v[2] - v[1] * u[2] == 0.0)
+            & (u[2] * v[0] - v[2] * u[0] == 0.0)
+            & (u[0] * v[1] - v[0] * u[1] == 0.0);
+        good[i] = !flat;
+        for k in 0..3 {
+            good[i] &= (a[k][i].abs() < LARGEST) & (b[k][i].abs() < LARGEST) & (c[k][i].abs() < LARGEST);
+        }
+    }
+    good.iter().fold(true, |all, &one| all & one)
+}
+
+/// Makes a box in each lane large enough.
+#[inline(always)]
+fn widen([a, b, c]: &[[[f32; LANES]; 3]; 3], lo: &mut [[f32; LANES]; 3], hi: &mut [[f32; LANES]; 3]) {
+    let (less, more) = (|a: f32, b: f32| if b < a { b } else { a }, |a: f32, b: f32| if b > a { b } else { a });
+    for k in 0..3 {
+        for i in 0..LANES {
+            lo[k][i] = less(lo[k][i], less(a[k][i], less(b[k][i], c[k][i])));
+            hi[k][i] = more(hi[k][i], more(a[k][i], more(b[k][i], c[k][i])));
+        }
+    }
+}
+
+/// One after the other.
+fn inspect(points: &[f32], faces: &mut [[u32; 3]], faults: &mut Faults, bounds: &mut Bounds) {
     let count = points.len() / 3;
-    let mut faults = Faults::default();
-    let (mut lo, mut hi) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for face in faces {
         if face.iter().any(|&i| i as usize >= count) {
             faults.out_of_range += 1;
@@ -217,7 +292,6 @@ fn inspect(points: &[f32], faces: &mut [[u32; 3]]) -> (Faults, Bounds) {
             continue;
         }
         let p = face.map(|i| Vec3::from_slice(&points[3 * i as usize..]));
-        let (face_lo, face_hi) = (p[0].min(p[1]).min(p[2]), p[0].max(p[1]).max(p[2]));
         let fits = |q: Vec3| q.abs().cmplt(Vec3::splat(LARGEST)).all();
         if !p.iter().all(|&q| fits(q)) {
             faults.non_finite += 1;
@@ -226,11 +300,9 @@ fn inspect(points: &[f32], faces: &mut [[u32; 3]]) -> (Faults, Bounds) {
             faults.degenerate += 1;
             *face = BAD_FACE;
         } else {
-            lo = lo.min(face_lo);
-            hi = hi.max(face_hi);
+            *bounds = bounds.union(p.map(Vec3::as_dvec3).into_iter().collect());
         }
     }
-    (faults, Bounds { lo: lo.as_dvec3(), hi: hi.as_dvec3() })
 }
 
 fn has_area(p: [Vec3; 3]) -> bool {
@@ -322,6 +394,27 @@ mod tests {
         let moved = mesh.moved(&to);
         assert!(near(moved.exact_triangle(0), want.map(|p| to.transform_point3(p))));
         assert_eq!(moved.triangle(0), moved.exact_triangle(0).map(DVec3::as_vec3));
+    }
+
+    #[test]
+    fn sixteen_at_a_time_are_inspected_as_one_is() {
+        let mut points: Vec<f32> = (0..90).map(|i| (i * i % 23) as f32 - 0.25 * (i % 7) as f32).collect();
+        (points[30], points[64]) = (f32::NAN, -3e18);
+        for count in [0, 15, 16, 17, 200] {
+            let index = |n: usize| (n * 7919 % 97 % 32) as u32;
+            let faces: Vec<[u32; 3]> = (0..count).map(|i| [index(i), index(7 * i + 3), index(5 * i + 1)]).collect();
+            let mut alone = faces.clone();
+            let (mut faults, mut bounds) = (Faults::default(), Bounds::EMPTY);
+            inspect(&points, &mut alone, &mut faults, &mut bounds);
+            assert!(count < 200 || (faults.non_finite > 0 && faults.out_of_range > 0 && faults.degenerate > 0));
+            for level in simd::Level::ALL {
+                let mut many = faces.clone();
+                let got = simd::run_at(level, Inspect { points: &points, faces: &mut many });
+                assert_eq!((got, &many), ((faults, bounds), &alone));
+            }
+            let good: Vec<_> = alone.iter().copied().filter(|&face| face != BAD_FACE).collect();
+            assert_eq!(inspect_all(&points, &mut good.clone()), (Faults::default(), bounds), "all of them good");
+        }
     }
 
     #[test]

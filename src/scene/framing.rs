@@ -1,7 +1,7 @@
 //! A camera and lights for a mesh that brings none.
 
 use super::{CameraDesc, Light, Projection, Scene};
-use crate::geom::{BAD_FACE, Bounds, ShapeSet};
+use crate::geom::{BAD_FACE, Bounds, ShapeSet, TriangleMesh};
 use crate::with_shapes;
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
@@ -144,23 +144,15 @@ impl Scene {
 
     /// Extremes over the corners of every triangle that can be hit, in camera axes.
     fn reach(&self, axes: impl Fn(DVec3) -> DVec3 + Sync, k: DVec2) -> Reach {
-        let of_mesh = |m: &super::Mesh, to_scene: &(dyn Fn(DVec3) -> DVec3 + Sync)| {
-            let mesh = &m.data.triangles;
-            mesh.faces()
-                .par_chunks(1 << 14)
-                .map(|faces| {
-                    let corners = faces.iter().filter(|&&f| f != BAD_FACE).flatten();
-                    corners.fold(Reach::NONE, |r, &i| r.with(axes(to_scene(mesh.point(i).as_dvec3())), k))
-                })
-                .reduce(|| Reach::NONE, Reach::union)
-        };
         let of_box = |r: Reach, b: Bounds| {
             let corner = |i: i32| DVec3::select(glam::BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), b.hi, b.lo);
             (0..8).fold(r, |r, i| r.with(axes(corner(i)), k))
         };
         let of_object = |o: &super::Object| match o {
-            super::Object::Mesh(m) => of_mesh(m, &|p| p),
-            super::Object::Instance(i) => of_mesh(&i.mesh, &|p| i.to_scene.transform_point3(p)),
+            super::Object::Mesh(m) => Reach::of_mesh(&m.data.triangles, k, &axes),
+            super::Object::Instance(i) => {
+                Reach::of_mesh(&i.mesh.data.triangles, k, |p| axes(i.to_scene.transform_point3(p)))
+            }
             super::Object::Shapes(s) => {
                 with_shapes!(&s.set, set => (0..set.len()).map(|i| set.bounds(i)).fold(Reach::NONE, of_box))
             }
@@ -190,22 +182,65 @@ impl Scene {
 }
 
 /// Largest `x + kx z`, `y + ky z` (plus), `-x + kx z`, `-y + ky z` (minus) and `z` (top).
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Reach {
     plus: DVec2,
     minus: DVec2,
     top: f64,
 }
 
+/// Vertices or triangles in one unit of work.
+const CHUNK: usize = 1 << 14;
+
 impl Reach {
     const NONE: Self = Self { plus: DVec2::NEG_INFINITY, minus: DVec2::NEG_INFINITY, top: f64::NEG_INFINITY };
+
+    /// That of the corners of every triangle of `mesh` that can be hit, in camera `axes`.
+    ///
+    /// A mesh has far fewer vertices than corners, and they lie in a row; only if it turns out that an extreme one
+    /// belongs to no triangle, all corners are gone through.
+    fn of_mesh(mesh: &TriangleMesh, k: DVec2, axes: impl Fn(DVec3) -> DVec3 + Sync) -> Self {
+        let place = |i: u32| Self::NONE.with(axes(mesh.point(i).as_dvec3()), k);
+        let all = (0..mesh.vertex_count() as u32).into_par_iter().with_min_len(CHUNK);
+        let found = all.clone().map(place).reduce(|| Self::NONE, Self::union);
+        let attained = |i: u32| Self::attained(place(i), found);
+        // A bit for each extreme that some triangle reaches; vertices that reach one are few.
+        let extreme: Vec<(u32, u32)> = all.map(|i| (i, attained(i))).filter(|&(_, bits)| bits != 0).collect();
+        let of_face = |face: &[u32; 3]| {
+            let of_corner = |&i: &u32| extreme.iter().filter(|&&(e, _)| e == i).fold(0, |bits, &(_, more)| bits | more);
+            face.iter().map(of_corner).fold(0, |a, b| a | b)
+        };
+        let few = extreme.len() <= 16;
+        let faces = || mesh.faces().par_iter().with_min_len(CHUNK);
+        if few && faces().map(of_face).reduce(|| 0, |a, b| a | b) == Self::ALL {
+            return found;
+        }
+        let good = faces().filter(|&&face| face != BAD_FACE);
+        good.map(|face| face.iter().map(|&i| place(i)).fold(Self::NONE, Self::union)).reduce(|| Self::NONE, Self::union)
+    }
+
+    /// A bit for each of its numbers.
+    const ALL: u32 = 0b1_1111;
+
+    /// Which numbers of `whole` this one has.
+    fn attained(self, whole: Self) -> u32 {
+        let equal = [
+            self.plus.x == whole.plus.x,
+            self.plus.y == whole.plus.y,
+            self.minus.x == whole.minus.x,
+            self.minus.y == whole.minus.y,
+            self.top == whole.top,
+        ];
+        equal.iter().fold(0, |bits, &one| bits << 1 | u32::from(one))
+    }
 
     #[inline]
     fn with(self, p: DVec3, k: DVec2) -> Self {
         let (xy, depth) = (p.truncate(), k * p.z);
-        Self { plus: self.plus.max(xy + depth), minus: self.minus.max(depth - xy), top: self.top.max(p.z) }
+        self.union(Self { plus: xy + depth, minus: depth - xy, top: p.z })
     }
 
+    #[inline]
     fn union(self, o: Self) -> Self {
         Self { plus: self.plus.max(o.plus), minus: self.minus.max(o.minus), top: self.top.max(o.top) }
     }
@@ -214,7 +249,6 @@ impl Reach {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::TriangleMesh;
     use crate::math::Frame;
     use crate::scene::{Mesh, Object};
     use std::sync::Arc;
@@ -228,6 +262,27 @@ mod tests {
             frame: Frame { origin: DVec3::new(1000.0, -3.0, 7.0), exponent: 3 },
             ..Scene::of(vec![Object::Mesh(Mesh::bare(triangles))])
         }
+    }
+
+    #[test]
+    fn extremes_are_those_of_corners() {
+        let k = DVec2::new(0.3, 0.2);
+        let of_corners = |mesh: &TriangleMesh| {
+            let corners = mesh.faces().iter().filter(|&&face| face != BAD_FACE).flatten();
+            corners.fold(Reach::NONE, |r, &i| r.with(mesh.point(i).as_dvec3(), k))
+        };
+        let Object::Mesh(unused) = &scene().objects[0] else { unreachable!("it is a mesh") };
+        // Vertex 2 belongs to a face that cannot be hit only; then to one that can.
+        let points = vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 9.0, 9.0, 9.0, 0.0, 1.0, -1.0];
+        let bad = TriangleMesh::new(points.clone(), vec![[0, 1, 3], [2, 2, 1]]);
+        let good = TriangleMesh::new(points, vec![[0, 1, 3], [2, 3, 1]]);
+        // Half of its corners are extreme.
+        let square = (0..200).flat_map(|i| [f32::from(i % 2 == 0), f32::from(i % 4 < 2), 0.0]).collect();
+        let square = TriangleMesh::new(square, (0..197).map(|i| [i, i + 1, i + 2]).collect());
+        for mesh in [&unused.data.triangles, &bad, &good, &square, &TriangleMesh::new(vec![], vec![])] {
+            assert_eq!(Reach::of_mesh(mesh, k, |p| p), of_corners(mesh));
+        }
+        assert_ne!(of_corners(&bad), of_corners(&good));
     }
 
     /// Image coordinates in [0, 1] of every used vertex.
