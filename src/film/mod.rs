@@ -8,6 +8,7 @@ mod tone;
 mod write;
 
 use rayon::prelude::*;
+use tison_pages::zeroes;
 
 pub use aov::{Aov, AovImage};
 pub use format::Format;
@@ -39,7 +40,7 @@ impl Film {
     pub fn new(width: u32, height: u32, aovs: &[Aov]) -> Self {
         let pixels = width as usize * height as usize;
         // Filled on all threads: the first touch of fresh memory is most of the cost.
-        let mut color = vec![[0.0; 3]; pixels];
+        let mut color = zeroes::<[f32; 3]>(pixels);
         color.par_chunks_mut(1 << 14).for_each(|part| part.fill([0.0; 3]));
         Self { width, height, color, aovs: aovs.iter().map(|&kind| AovImage::new(kind, pixels)).collect(), finished: 0 }
     }

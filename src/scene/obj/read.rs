@@ -13,6 +13,7 @@ use super::survey::{self, Sampling, Survey, Tally, running_totals};
 use super::{CornerData, Counts, ObjFile, ReadOptions};
 use crate::math::Frame;
 use rayon::prelude::*;
+use tison_pages::zeroes;
 
 /// Reads `source` in pieces of about `piece` bytes.
 pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Result<ObjFile, Error> {
@@ -136,10 +137,10 @@ struct Arrays {
 impl Arrays {
     fn new(plan: &Plan) -> Self {
         let triangles = plan.total.triangles as usize;
-        let values = |wanted: bool, components: u64| if wanted { vec![0.0; components as usize] } else { Vec::new() };
+        let values = |wanted: bool, components: u64| zeroes(if wanted { components as usize } else { 0 });
         Self {
-            points: vec![0.0; 3 * plan.total.vertices as usize + 1],
-            faces: vec![[0; 3]; triangles],
+            points: zeroes(3 * plan.total.vertices as usize + 1),
+            faces: zeroes(triangles),
             normals: values(plan.normals, 3 * plan.total.normals),
             uvs: values(plan.uv, 2 * plan.total.textures),
             normal_of: plan.normals.then(|| Some(vec![[0; 3]; triangles])),

@@ -15,6 +15,7 @@ use super::vertices::{self, Target, VertexWriter};
 use crate::math::Frame;
 use glam::DVec3;
 use rayon::prelude::*;
+use tison_pages::zeroes;
 
 /// Reads `source` in parts of about `piece` bytes.
 pub(super) fn read(source: &Source, options: &ReadOptions<'_>, piece: u64) -> Result<ObjFile, Error> {
@@ -144,8 +145,8 @@ impl Reader<'_> {
         let frame = Frame::fit(&self.sample(&parts)?);
         let count = layout.element.count as usize;
         self.check_memory(layout)?;
-        let room = |first, components| if layout.has(first) { vec![0.0; components * count] } else { Vec::new() };
-        let (mut points, mut normals, mut uvs) = (vec![0.0; 3 * count + 1], room(NORMAL, 3), room(UV, 2));
+        let room = |first, components| zeroes(if layout.has(first) { components * count } else { 0 });
+        let (mut points, mut normals, mut uvs) = (zeroes(3 * count + 1), room(NORMAL, 3), room(UV, 2));
         let targets = targets(&parts, &mut points, &mut normals, &mut uvs);
         let read = self.file.each_as_found(layout.element, &parts, targets, |part, target, bytes| {
             let mut writer = VertexWriter::new(layout, &frame, target);
@@ -243,7 +244,7 @@ impl Reader<'_> {
         obj::check_count(self.file.source, "triangles", count).map_err(Stop::Error)?;
         let File { source, options, .. } = self.file;
         options.free_memory.check_mesh(&source.path, count, 12 * count).map_err(Stop::Error)?;
-        let mut faces = vec![[0; 3]; count as usize];
+        let mut faces = zeroes(count as usize);
         let targets = cut(&mut faces, parts.iter().map(|p| p.triangles as usize));
         let vertices = self.vertices.element.count;
         let found = self.file.each(self.faces.element, parts, targets, |part, faces, bytes| {
