@@ -11,7 +11,10 @@ use crate::backend::Backend;
 /// A tile and what is known of its pixels.
 #[derive(Debug, Default)]
 pub struct Area {
+    tile: Crop,
     pixels: Pixels,
+    /// Their colours as the film has them: row by row.
+    rows: Vec<[f32; 3]>,
     /// Places in `pixels` of those that are sampled twice.
     twice: Vec<usize>,
     /// Their second samples.
@@ -23,14 +26,15 @@ pub struct Area {
 impl Area {
     /// Forgets what it was and becomes `tile`, without samples.
     pub fn become_tile(&mut self, tile: Crop, job: &Job, twice: Option<&Twice>) {
+        self.tile = tile;
         tile::pixels(tile, &mut self.pixels.at);
-        self.pixels.start(job.gathers_hits());
+        self.pixels.start(job.gathers_hits(), job.spp == 1 && twice.is_none());
         self.twice.clear();
         self.again.clear();
         if let Some(twice) = twice {
             self.twice.extend((0..self.pixels.at.len()).filter(|&i| twice.is(self.pixels.at[i])));
             self.again.at.extend(self.twice.iter().map(|&i| self.pixels.at[i]));
-            self.again.start(false);
+            self.again.start(false, false);
         }
         self.is_begun = false;
     }
@@ -98,31 +102,50 @@ impl Area {
         self.pixels.at.iter().copied().zip(self.pixels.sums.iter().map(Progress::of))
     }
 
-    /// Puts it into the film, if it has been begun; the number of pixels.
+    /// Puts its colours into the film's order, which nobody has to wait for.
+    pub fn settle(&mut self) {
+        let (tile, Pixels { at, sums, lone, .. }) = (self.tile, &self.pixels);
+        self.rows.resize(at.len(), [0.0; 3]);
+        match lone {
+            Some(lone) => at.iter().zip(&lone.color).for_each(|(&xy, color)| self.rows[tile.index(xy)] = *color),
+            None => at.iter().zip(sums).for_each(|(&xy, sum)| {
+                self.rows[tile.index(xy)] = sum.mean().as_vec3().to_array();
+            }),
+        }
+    }
+
+    /// Puts it into the film, if it has been begun and [settled](Self::settle); the number of pixels.
     pub fn hand_in<const SECONDARY: bool>(&self, index: usize, crop: Crop, sum: &mut Sum) -> usize {
         if !self.is_begun {
             return 0;
         }
-        let mut cut = [0.0; 2];
-        for (&xy, pixel) in self.pixels.at.iter().zip(&self.pixels.sums) {
-            sum.film.color[crop.index(xy)] = pixel.mean().as_vec3().to_array();
-            sum.samples += u64::from(pixel.taken);
-            sum.non_finite += u64::from(pixel.taken - pixel.counted);
-            if !SECONDARY {
-                continue;
+        let (tile, width) = (self.tile, (self.tile.x1 - self.tile.x0) as usize);
+        for (y, row) in (tile.y0..tile.y1).zip(self.rows.chunks_exact(width)) {
+            sum.film.color[crop.index((tile.x0, y))..][..width].copy_from_slice(row);
+        }
+        match &self.pixels.lone {
+            Some(lone) => {
+                sum.samples += lone.color.len() as u64;
+                sum.non_finite += lone.non_finite;
+                sum.note_cut(index, lone.cut.iter().copied());
             }
-            let ends = sum.cut_max.iter_mut().zip(&mut cut);
-            for ((max, total), own) in ends.zip(pixel.cut.map(|c| c / f64::from(pixel.taken))) {
-                *max = max.max(own);
-                *total += own;
+            None => {
+                let sums = &self.pixels.sums;
+                for pixel in sums {
+                    sum.samples += u64::from(pixel.taken);
+                    sum.non_finite += u64::from(pixel.taken - pixel.counted);
+                }
+                if SECONDARY {
+                    sum.note_cut(index, sums.iter().map(|pixel| pixel.cut.map(|c| c / f64::from(pixel.taken))));
+                }
             }
         }
-        sum.cut_of_tile[index] = cut;
         if let Some(error) = sum.error_of_tile.get_mut(index) {
             *error = self.error();
         }
         for (i, hits) in self.pixels.hits.iter().enumerate() {
-            let (at, taken) = (crop.index(self.pixels.at[i]), self.pixels.sums[i].taken);
+            let taken = self.pixels.sums.get(i).map_or(1, |sum| sum.taken);
+            let at = crop.index(self.pixels.at[i]);
             sum.film.aovs.iter_mut().for_each(|image| hits.write(image, at, taken));
         }
         let pixels = self.pixels.at.len();

@@ -133,6 +133,20 @@ struct Sum {
     non_finite: u64,
 }
 
+impl Sum {
+    /// What was cut off in the pixels of a tile.
+    fn note_cut(&mut self, tile: usize, pixels: impl Iterator<Item = [f64; 2]>) {
+        let mut total = [0.0; 2];
+        for cut in pixels {
+            for ((max, total), own) in self.cut_max.iter_mut().zip(&mut total).zip(cut) {
+                *max = max.max(own);
+                *total += own;
+            }
+        }
+        self.cut_of_tile[tile] = total;
+    }
+}
+
 /// What the tiles of a render have in common.
 struct Common {
     started: Instant,
@@ -167,6 +181,7 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
                 if !area.begin(&mut worker, self.job.spp, self.twice.as_ref()) {
                     break;
                 }
+                area.settle();
                 let mut sum = lock(&sum);
                 let pixels = area.hand_in::<SECONDARY>(index, self.job.crop, &mut sum);
                 self.control.pixels.fetch_add(pixels as u64, Relaxed);

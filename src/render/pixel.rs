@@ -105,6 +105,37 @@ impl PixelSum {
     }
 }
 
+/// Pixels with a sample each, of which there is nothing to add up.
+#[derive(Clone, Debug, Default)]
+pub struct Lone {
+    /// Linear RGB; black where the sample does not count.
+    pub color: Vec<[f32; 3]>,
+    /// As in [`Bound`](super::certificate::Bound); empty if nothing is ever cut.
+    pub cut: Vec<[f64; 2]>,
+    /// Samples that do not count.
+    pub non_finite: u64,
+}
+
+impl Lone {
+    /// None of them.
+    pub fn clear(&mut self) {
+        self.color.clear();
+        self.cut.clear();
+        self.non_finite = 0;
+    }
+
+    /// The next ones.
+    pub fn add(&mut self, samples: &[DVec3], cut: &[[f64; 2]]) {
+        self.color.extend(samples.iter().map(|sample| {
+            let color = sample.as_vec3();
+            let finite = color.is_finite();
+            self.non_finite += u64::from(!finite);
+            if finite { color.to_array() } else { [0.0; 3] }
+        }));
+        self.cut.extend_from_slice(cut);
+    }
+}
+
 /// The sample as films hold it, if it can be held.
 #[inline]
 fn kept(sample: DVec3) -> Option<DVec3> {
@@ -220,6 +251,22 @@ mod tests {
         // Samples around 1 that deviate by a third, times weights of a root mean square of 1.08.
         let ratio = weighed(&samples).error() / squared_error(&samples);
         assert!((1.0..1.35).contains(&ratio), "{ratio}");
+    }
+
+    #[test]
+    fn a_lone_sample_is_the_sum_of_one() {
+        let some =
+            [DVec3::new(0.1, 0.7, 1.0 / 3.0), DVec3::NAN, DVec3::new(1e300, 0.0, 0.0), DVec3::new(-0.1, 0.0, 9.0)];
+        let mut lone = Lone::default();
+        lone.add(&some[..1], &[]);
+        lone.add(&some[1..], &[]);
+        let sums = some.map(|sample| {
+            let mut sum = PixelSum::default();
+            sum.add(&[sample], false);
+            sum
+        });
+        assert_eq!(lone.color, sums.map(|sum| sum.mean().as_vec3().to_array()));
+        assert_eq!(lone.non_finite, sums.iter().map(|sum| u64::from(sum.taken - sum.counted)).sum::<u64>());
     }
 
     #[test]

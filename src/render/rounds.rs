@@ -154,7 +154,8 @@ impl<'a, B: Backend, const SECONDARY: bool> Rounds<'a, B, SECONDARY> {
         let mut sum = self.sum.into_inner().unwrap_or_else(PoisonError::into_inner);
         let mut stopped_early = 0;
         for (index, area) in self.areas.into_iter().enumerate() {
-            let area = area.into_inner().unwrap_or_else(PoisonError::into_inner);
+            let mut area = area.into_inner().unwrap_or_else(PoisonError::into_inner);
+            area.settle();
             area.hand_in::<SECONDARY>(index, job.crop, &mut sum);
             stopped_early += area.progress().filter(|(_, p)| (1..job.spp).contains(&p.taken)).count() as u64;
         }

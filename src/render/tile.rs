@@ -140,7 +140,7 @@ impl<'a> Segment<'a> {
                     (lens[0][lane], lens[1][lane]) = (disc.x, disc.y);
                 }
             }
-            simd::run(CameraRays { camera, at: &at, lens: &lens, packet: &mut packet.ray });
+            CameraRays { camera, at: &at, lens: &lens, packet: &mut packet.ray }.fill();
         }
         drawn
     }

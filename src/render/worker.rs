@@ -1,7 +1,7 @@
 //! One thread's part of a render: samples of pixels, by segments.
 
 use super::estimate::Twice;
-use super::pixel::{FirstHits, PixelSum};
+use super::pixel::{FirstHits, Lone, PixelSum};
 use super::tile::{self, Segment};
 use super::wave::{Tally, Waves};
 use super::{Common, Render};
@@ -16,8 +16,10 @@ use std::sync::atomic::Ordering::Relaxed;
 pub struct Pixels {
     /// Where they are, along a Z-curve.
     pub at: Vec<(u32, u32)>,
-    /// One for each.
+    /// One for each; empty where they are lone.
     pub sums: Vec<PixelSum>,
+    /// What they are instead of sums if they get one sample each.
+    pub lone: Option<Lone>,
     /// One for each; empty unless auxiliary images are wanted.
     pub hits: Vec<FirstHits>,
 }
@@ -27,6 +29,7 @@ impl Pixels {
     pub fn clear(&mut self) {
         self.at.clear();
         self.sums.clear();
+        self.lone = None;
         self.hits.clear();
     }
 
@@ -35,6 +38,7 @@ impl Pixels {
         Self {
             at: places.iter().map(|&i| self.at[i]).collect(),
             sums: places.iter().map(|&i| self.sums[i]).collect(),
+            lone: None,
             hits: if self.hits.is_empty() { Vec::new() } else { places.iter().map(|&i| self.hits[i]).collect() },
         }
     }
@@ -49,11 +53,16 @@ impl Pixels {
         }
     }
 
-    /// Starts anew with the pixels that are `at` places, `hits` if auxiliary images are wanted.
-    pub fn start(&mut self, hits: bool) {
+    /// Starts anew with the pixels that are `at` places, `hits` if auxiliary images are wanted; `lone` if they get one
+    /// sample each.
+    pub fn start(&mut self, hits: bool, lone: bool) {
         let n = self.at.len();
         self.sums.clear();
-        self.sums.resize(n, PixelSum::default());
+        self.lone = lone.then(|| self.lone.take().unwrap_or_default());
+        match &mut self.lone {
+            Some(lone) => lone.clear(),
+            None => self.sums.resize(n, PixelSum::default()),
+        }
         self.hits.clear();
         self.hits.resize(if hits { n } else { 0 }, FirstHits::default());
     }
@@ -92,7 +101,7 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
         let rays = if SECONDARY && self.render.job.k_max > 0 { tile::WIDE_SEGMENT } else { tile::SEGMENT };
         let mut first_pixel = 0;
         let last = samples.end;
-        let Pixels { at, sums, hits } = pixels;
+        let Pixels { at, sums, lone, hits } = pixels;
         for segment in tile::segments(at, samples, sampling, rays) {
             // A tile of many samples takes long.
             if control.is_cancelled() {
@@ -102,7 +111,10 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
             let drawn = segment.camera_rays(&self.render.camera, self.render.job, &mut self.batch);
             self.waves.tally.note_drawn(drawn, self.batch.len());
             self.waves.trace(&mut self.batch, &segment, Coherence::Coherent);
-            self.add_up(&mut sums[first_pixel..], &segment);
+            match lone {
+                Some(lone) => lone.add(&self.waves.gathered.color, &self.waves.gathered.cut),
+                None => self.add_up(&mut sums[first_pixel..], &segment),
+            }
             if !hits.is_empty() {
                 self.first_hits(&mut hits[first_pixel..], &segment);
             }

@@ -2,7 +2,7 @@
 
 use crate::geom::{LANES, RayPacket};
 use crate::math::Frame;
-use crate::simd::Kernel;
+use crate::simd::{self, Kernel};
 use glam::{DVec2, DVec3};
 
 /// A camera as given: world space, f64.
@@ -177,25 +177,41 @@ pub struct CameraRays<'a> {
     pub packet: &'a mut RayPacket,
 }
 
-impl Kernel for CameraRays<'_> {
+impl CameraRays<'_> {
+    /// Computes them.
+    pub fn fill(self) {
+        if self.camera.lens.is_some() {
+            simd::run(Fill::<true>(self));
+        } else {
+            simd::run(Fill::<false>(self));
+        }
+    }
+}
+
+/// With a lens, or a pinhole.
+struct Fill<'a, const LENS: bool>(CameraRays<'a>);
+
+impl<const LENS: bool> Kernel for Fill<'_, LENS> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let c = self.camera;
+        let Self(CameraRays { camera: c, at: image, lens, packet: p }) = self;
         let (across, up, focus) = c.lens.map_or((DVec3::ZERO, DVec3::ZERO, 1.0), |l| (l.across, l.up, l.focus));
         let (mut o, mut d) = ([[0f32; LANES]; 3], [[0f32; LANES]; 3]);
         for k in 0..3 {
             for i in 0..LANES {
-                let at = c.corner[k] + c.right[k] * self.at[0][i] + c.down[k] * self.at[1][i];
-                let shift = across[k] * self.lens[0][i] + up[k] * self.lens[1][i];
-                let (from, along) = if c.parallel { (at, c.forward[k]) } else { (c.eye[k], at) };
-                o[k][i] = (from + shift) as f32;
-                let along = (along - shift / focus) as f32;
+                let at = c.corner[k] + c.right[k] * image[0][i] + c.down[k] * image[1][i];
+                let (mut from, mut along) = if c.parallel { (at, c.forward[k]) } else { (c.eye[k], at) };
+                if LENS {
+                    let shift = across[k] * lens[0][i] + up[k] * lens[1][i];
+                    (from, along) = (from + shift, along - shift / focus);
+                }
+                let along = along as f32;
+                o[k][i] = from as f32;
                 d[k][i] = if along.abs() < f32::MIN_POSITIVE { 0.0 } else { along };
             }
         }
-        let p = self.packet;
         [p.o_x, p.o_y, p.o_z] = o;
         [p.d_x, p.d_y, p.d_z] = d;
         p.t_near = [0.0; LANES];
@@ -269,7 +285,7 @@ mod tests {
             let disc =
                 [std::array::from_fn(|i| (i as f64).sin() * 0.7), std::array::from_fn(|i| (i as f64).cos() * 0.7)];
             let mut packet = RayPacket::EMPTY;
-            crate::simd::run(CameraRays { camera: &camera, at: &at, lens: &disc, packet: &mut packet });
+            CameraRays { camera: &camera, at: &at, lens: &disc, packet: &mut packet }.fill();
             for i in 0..LANES {
                 let (o, d) = camera.ray(at[0][i], at[1][i], DVec2::new(disc[0][i], disc[1][i]));
                 let ray = packet.get(i);
