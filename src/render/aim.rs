@@ -5,7 +5,7 @@ use super::lights;
 use crate::geom::{LANES, RayPacket};
 use crate::scene::Light;
 use crate::simd::{self, Kernel};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// End of a shadow ray that was sent at a light: just short of it.
 pub const BEFORE_THE_LIGHT: f32 = 1.0 - 4.0 * 0.5 * f32::EPSILON;
@@ -54,10 +54,12 @@ pub struct Asked {
     pub faint: u32,
     /// Whether highlights were computed.
     pub power: bool,
+    /// Whether nothing was: no light gets there.
+    pub dark: bool,
 }
 
 /// Shadow rays from a block to the middle of a light, and what the light would add: `t_far` is minus
-/// infinity in the lanes that need none. Highlights are seen as [`Lit`](lights::Lit) has it.
+/// infinity in the lanes that need none. Highlights are seen from a point, or else from where each ray came.
 pub fn at_center(
     block: &Block,
     light: &Light,
@@ -66,6 +68,9 @@ pub fn at_center(
     packet: &mut RayPacket,
     shine: &mut Shine,
 ) -> Asked {
+    if rules.outside && block.enclosed[..block.len].iter().all(|&enclosed| enclosed) {
+        return all_enclosed(block, packet);
+    }
     let view = &lights::view(block, seen_from);
     let power = rules.power || lights::shines(block);
     let asked = match (power, light.falloff.is_some()) {
@@ -75,6 +80,14 @@ pub fn at_center(
         (true, true) => simd::run(AtCenter::<true, true> { block, light, view, rules, packet, shine }),
     };
     Asked { power, ..asked }
+}
+
+/// What [`at_center`] tells where no light gets at all.
+fn all_enclosed(block: &Block, packet: &mut RayPacket) -> Asked {
+    packet.t_far = [f32::NEG_INFINITY; LANES];
+    let answers = |lane: &usize| Block::vec3(&block.diffuse, *lane) + Block::vec3(&block.specular, *lane) != Vec3::ZERO;
+    let enclosed = (0..block.len).filter(answers).fold(0, |lanes, lane| lanes | 1 << lane);
+    Asked { enclosed, dark: true, ..Asked::default() }
 }
 
 /// Shadow rays from the lanes `wanted` of a block to one point each, where that is not behind the
@@ -110,20 +123,21 @@ impl<const SPECULAR: bool, const FALLOFF: bool> Kernel for AtCenter<'_, SPECULAR
                 d[k][i] = from_front(b, i, k, l[k]);
             }
         }
-        let add = lights::answers::<SPECULAR, FALLOFF>(b, self.light, &[1.0; LANES], &d, self.view);
+        let add = lights::answers::<SPECULAR, FALLOFF>(b, self.light, &d, self.view);
         let mut asked = Asked::default();
         let mut t_far = [f32::NEG_INFINITY; LANES];
         for i in 0..LANES {
             let some = (add[0][i] != 0.0) | (add[1][i] != 0.0) | (add[2][i] != 0.0);
             let most = (b.weight[0][i] * add[0][i]).max(b.weight[1][i] * add[1][i]).max(b.weight[2][i] * add[2][i]);
-            let (candidate, hidden) = (live[i] & lit[i] & some, self.rules.outside & b.enclosed[i]);
+            let hidden = self.rules.outside & b.enclosed[i];
+            let candidate = live[i] & !hidden & lit[i] & some;
             let faint = (b.depth[i] > 0) & (most < self.rules.faint);
-            let send = candidate & !hidden & !faint;
+            let send = candidate & !faint;
             t_far[i] = if send { BEFORE_THE_LIGHT } else { f32::NEG_INFINITY };
             asked.sent |= u32::from(send) << i;
-            asked.facing_away |= u32::from(live[i] & !lit[i]) << i;
-            asked.enclosed |= u32::from(candidate & hidden) << i;
-            asked.faint |= u32::from(candidate & !hidden & faint) << i;
+            asked.enclosed |= u32::from(live[i] & hidden) << i;
+            asked.facing_away |= u32::from(live[i] & !hidden & !lit[i]) << i;
+            asked.faint |= u32::from(candidate & faint) << i;
         }
         self.shine.add = add;
         fill(self.packet, b, d, t_far);
@@ -184,7 +198,6 @@ fn fill(p: &mut RayPacket, b: &Block, d: [F32; 3], t_far: F32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
 
     const ALL: Rules = Rules { faint: 0.0, outside: true, power: false };
 
@@ -233,7 +246,7 @@ mod tests {
     fn from_inside_a_closed_shape_lights_outside_are_hidden() {
         let mut b = block();
         b.enclosed = [true; LANES];
-        assert_eq!(asked(&b, DVec3::Y, ALL).0, Asked { enclosed: 1, ..Asked::default() });
+        assert_eq!(asked(&b, DVec3::Y, ALL).0, Asked { enclosed: 1, dark: true, ..Asked::default() });
         assert_eq!(asked(&b, DVec3::Y, Rules { outside: false, ..ALL }).0.sent, 1);
     }
 

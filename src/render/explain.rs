@@ -4,13 +4,13 @@ use super::aim::{self, Asked, Rules, Shine};
 use super::block::{Block, Path};
 use super::job::Job;
 use super::known::Known;
-use super::lights::{self, Lit};
+use super::lights;
 use super::media::Media;
 use super::shade::Onwards;
 use super::surface::SurfacePoint;
 use super::tile::Segment;
 use crate::backend::{AnyBackend, Backend};
-use crate::geom::{Coherence, Hit, LANES, PacketBatch, Ray, RayPacket};
+use crate::geom::{Coherence, Hit, PacketBatch, Ray, RayPacket};
 use crate::scene::{CameraDesc, Needs, Scene};
 use glam::{DVec3, Vec3};
 use std::fmt::Write;
@@ -127,7 +127,7 @@ impl<B: Backend> Teller<'_, B> {
                 &format!("{indent}{} weight {weight:.4}: nothing hit, background adds {}\n", this.what, rgb(add));
             return add;
         };
-        let mut block = Block::single(self.scene, &this.ray, &hit, &path);
+        let block = Block::single(self.scene, &this.ray, &hit, &path);
         let point = SurfacePoint::of_lane(&block, 0);
         let m = &self.scene.materials[point.material];
         let p = self.scene.frame.to_world(point.p);
@@ -151,14 +151,14 @@ impl<B: Backend> Teller<'_, B> {
         told.out += &format!("{indent}  ambient and emission: {}\n", rgb(own));
         let mut add = own;
         for index in 0..told.known.lights.len() {
-            add += self.light(index, &mut block, &indent, told);
+            add += self.light(index, &block, &indent, told);
         }
         self.branches(&path, &block, stack, told, &indent);
         add
     }
 
     /// Tells about one light and returns what it adds.
-    fn light(&self, index: usize, block: &mut Block, indent: &str, told: &mut Told<'_>) -> Vec3 {
+    fn light(&self, index: usize, block: &Block, indent: &str, told: &mut Told<'_>) -> Vec3 {
         let light = &told.known.lights[index];
         let faint = Rules::FAINT_SHARE * self.job.min_weight;
         let rules = Rules { faint, outside: told.known.enclosures.is_outside(index), power: false };
@@ -183,11 +183,7 @@ impl<B: Backend> Teller<'_, B> {
             told.out += &format!("{indent}  light {index}: {}\n", why_dark(asked));
             return Vec3::ZERO;
         }
-        block.color = [[0.0; LANES]; 3];
-        let to_light = lights::to_center(block, light);
-        let (lanes, shines) = (&[visible; LANES], lights::shines(block));
-        lights::add(block, light, Lit { visible: lanes, to_light: &to_light, seen_from: told.seen_from }, shines);
-        let lit = Block::vec3(&block.weight, 0) * Block::vec3(&block.color, 0);
+        let lit = Block::vec3(&block.weight, 0) * (Block::vec3(&shine.add, 0) * visible);
         let part = if visible < 1.0 { format!(" ({:.0} % of it visible)", 100.0 * visible) } else { String::new() };
         told.out += &format!("{indent}  light {index}: {}{part}\n", rgb(lit));
         lit

@@ -6,36 +6,13 @@ use super::block::{Block, F32, F64};
 use crate::geom::{LANES, RayPacket};
 use crate::math::{concentric_disc, pow01};
 use crate::scene::Light;
-use crate::simd::{self, Kernel};
 use glam::DVec3;
-
-/// How shadow rays went, and where highlights are seen from.
-#[derive(Clone, Copy, Debug)]
-pub struct Lit<'a> {
-    /// Unoccluded share of the light for each lane.
-    pub visible: &'a F32,
-    /// Vectors to the middle of the light, as the shadow rays have them.
-    pub to_light: &'a [F32; 3],
-    /// Highlights are seen from this point; `None`: from where the ray came.
-    pub seen_from: Option<DVec3>,
-}
 
 /// 1 in the lanes whose rays got through, else 0.
 #[inline]
 #[must_use]
 pub fn unoccluded(packet: &RayPacket) -> F32 {
     packet.t_far.map(|t| if t != f32::NEG_INFINITY { 1.0 } else { 0.0 })
-}
-
-/// Adds the light to the lanes of `block` as far as it is visible from there, highlights only if it `shines`.
-pub fn add(block: &mut Block, light: &Light, lit: Lit<'_>, shines: bool) {
-    let view = &view(block, lit.seen_from);
-    match (shines, light.falloff.is_some()) {
-        (false, false) => simd::run(Add::<false, false> { block, light, lit, view }),
-        (false, true) => simd::run(Add::<false, true> { block, light, lit, view }),
-        (true, false) => simd::run(Add::<true, false> { block, light, lit, view }),
-        (true, true) => simd::run(Add::<true, true> { block, light, lit, view }),
-    }
 }
 
 /// Whether any lane of `block` has a highlight: if not, there is no power to take.
@@ -52,13 +29,6 @@ pub fn view(block: &Block, seen_from: Option<DVec3>) -> [F32; 3] {
     seen_from.map_or(block.to_eye, |eye| towards(block, eye))
 }
 
-/// Vectors from where shadow rays start to the middle of the light.
-#[must_use]
-pub fn to_center(block: &Block, light: &Light) -> [F32; 3] {
-    let l = light.position.to_array();
-    [0, 1, 2].map(|k| block.front[k].map(|from| (l[k] - f64::from(from)) as f32))
-}
-
 /// Unit vectors from the points of a block to one point.
 fn towards(b: &Block, to: DVec3) -> [F32; 3] {
     let mut view = [[0.0; LANES]; 3];
@@ -69,30 +39,9 @@ fn towards(b: &Block, to: DVec3) -> [F32; 3] {
     view
 }
 
-struct Add<'a, const SPECULAR: bool, const FALLOFF: bool> {
-    block: &'a mut Block,
-    light: &'a Light,
-    lit: Lit<'a>,
-    view: &'a [F32; 3],
-}
-
-impl<const SPECULAR: bool, const FALLOFF: bool> Kernel for Add<'_, SPECULAR, FALLOFF> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let (b, lit) = (self.block, self.lit);
-        let add = answers::<SPECULAR, FALLOFF>(b, self.light, lit.visible, lit.to_light, self.view);
-        for k in 0..3 {
-            for i in 0..LANES {
-                b.color[k][i] += add[k][i];
-            }
-        }
-    }
-}
-
 /// Blinn-Phong: diffuse N·L, specular (N·H)^shininess with H halfway between light and eye. Linear RGB of the
-/// light as far as it is `visible`; `view` is unit. To be inlined into a [`Kernel`].
+/// whole light; `to_light` are vectors to its middle, `view` is unit. To be inlined into a
+/// [`Kernel`](crate::simd::Kernel).
 ///
 /// Source: J. F. Blinn, "Models of Light Reflection for Computer Synthesized Pictures",
 /// SIGGRAPH 1977.
@@ -100,7 +49,6 @@ impl<const SPECULAR: bool, const FALLOFF: bool> Kernel for Add<'_, SPECULAR, FAL
 pub fn answers<const SPECULAR: bool, const FALLOFF: bool>(
     b: &Block,
     light: &Light,
-    visible: &F32,
     to_light: &[F32; 3],
     view: &[F32; 3],
 ) -> [F32; 3] {
@@ -114,8 +62,7 @@ pub fn answers<const SPECULAR: bool, const FALLOFF: bool>(
         let inv = 1.0 / square.sqrt();
         let n = [b.ns[0][i] as f32, b.ns[1][i] as f32, b.ns[2][i] as f32];
         // At the very place of a light that weakens from there, as good as infinite is enough.
-        let arrives = if FALLOFF { 1.0 / (falloff * square).max(f32::MIN_POSITIVE) } else { 1.0 };
-        strength[i] = visible[i] * arrives;
+        strength[i] = if FALLOFF { 1.0 / (falloff * square).max(f32::MIN_POSITIVE) } else { 1.0 };
         diffuse[i] = strength[i] * ((n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) * inv).max(0.0);
         if SPECULAR {
             let h = [0, 1, 2].map(|k| d[k] * inv + view[k][i]);
@@ -183,41 +130,39 @@ mod tests {
         Light::constant(position, Vec3::new(1.0, 2.0, 3.0))
     }
 
-    /// As a wave does it.
-    fn shine(b: &mut Block, light: &Light, seen_from: Option<DVec3>) -> Vec3 {
-        let before = Block::vec3(&b.color, 0);
-        let to_light = to_center(b, light);
-        let shining = shines(b);
-        add(b, light, Lit { visible: &[1.0; LANES], to_light: &to_light, seen_from }, shining);
-        Block::vec3(&b.color, 0) - before
+    /// As a wave has it.
+    fn shine(b: &Block, light: &Light, seen_from: Option<DVec3>) -> Vec3 {
+        let mut shine = aim::Shine::NONE;
+        aim::at_center(b, light, seen_from, aim::Rules::default(), &mut RayPacket::EMPTY.clone(), &mut shine);
+        Block::vec3(&shine.add, 0)
     }
 
     #[test]
     fn blinn_phong_by_hand() {
         let mut b = block();
         let light = light(DVec3::new(6.0, 8.0, 0.0));
-        let dull = shine(&mut b, &light, None);
+        let dull = shine(&b, &light, None);
         assert!((dull - Vec3::new(0.4, 0.4, 0.0)).length() < 1e-6);
         b.specular = [[0.5; LANES]; 3];
         b.shininess = [2.0; LANES];
         // h halves the angle between light and +y: cos 2a = 0.8, (cos a)^2 = 0.9.
         let want = Vec3::new(0.4, 0.4, 0.0) + light.color * 0.45;
-        assert!((shine(&mut b, &light, None) - want).length() < 1e-6);
+        assert!((shine(&b, &light, None) - want).length() < 1e-6);
         // Seen from where the mirrored light goes, h is the normal.
         let want = Vec3::new(0.4, 0.4, 0.0) + light.color * 0.5;
-        assert!((shine(&mut b, &light, Some(DVec3::new(-3.0, 4.0, 0.0))) - want).length() < 1e-6);
+        assert!((shine(&b, &light, Some(DVec3::new(-3.0, 4.0, 0.0))) - want).length() < 1e-6);
     }
 
     #[test]
     fn light_weakens_with_the_square_of_the_distance() {
-        let mut b = block();
+        let b = block();
         let constant = light(DVec3::new(0.0, 4.0, 0.0));
-        let full = shine(&mut b, &constant, None);
-        let weak = shine(&mut b, &Light { falloff: Some(1.0), ..constant }, None);
+        let full = shine(&b, &constant, None);
+        let weak = shine(&b, &Light { falloff: Some(1.0), ..constant }, None);
         assert!((weak * 16.0 - full).length() < 1e-6);
-        let in_larger_units = shine(&mut b, &Light { falloff: Some(4.0), ..constant }, None);
+        let in_larger_units = shine(&b, &Light { falloff: Some(4.0), ..constant }, None);
         assert!((in_larger_units * 64.0 - full).length() < 1e-6);
-        let at_the_point = shine(&mut b, &Light { falloff: Some(1.0), ..light(DVec3::ZERO) }, None);
+        let at_the_point = shine(&b, &Light { falloff: Some(1.0), ..light(DVec3::ZERO) }, None);
         assert_eq!(at_the_point, Vec3::ZERO);
     }
 

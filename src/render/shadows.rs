@@ -11,10 +11,11 @@ const ALL_LANES: u32 = (1 << LANES) - 1;
 
 /// A batch of them, and whose they are.
 ///
-/// `DENSE` moves the rays of many blocks together, so that packets are full where many lanes need
-/// none, as after bounces; else every block has a packet of its own.
+/// Either every block has a packet of its own, or the rays of many blocks move together, so that packets are full
+/// where many lanes need none, as after bounces.
 #[derive(Debug)]
-pub struct Shadows<const DENSE: bool> {
+pub struct Shadows {
+    dense: bool,
     batch: PacketBatch<RayPacket>,
     /// The block of each packet; of each ray, if dense, block and lane.
     owners: Vec<u32>,
@@ -36,11 +37,12 @@ pub struct How {
     pub all: bool,
 }
 
-impl<const DENSE: bool> Shadows<DENSE> {
+impl Shadows {
     /// None yet.
     #[must_use]
     pub fn new(how: How) -> Self {
         Self {
+            dense: false,
             batch: PacketBatch::default(),
             owners: Vec::new(),
             aimed: Box::new(RayPacket::EMPTY),
@@ -51,8 +53,9 @@ impl<const DENSE: bool> Shadows<DENSE> {
         }
     }
 
-    /// Forgets all, and makes room for the answers of `blocks`.
-    pub fn start(&mut self, blocks: usize) {
+    /// Forgets all, and makes room for the answers of `blocks`, whose rays move together if they are to be `dense`.
+    pub fn start(&mut self, blocks: usize, dense: bool) {
+        self.dense = dense;
         self.batch.clear();
         self.owners.clear();
         self.visible.clear();
@@ -66,14 +69,14 @@ impl<const DENSE: bool> Shadows<DENSE> {
     /// rays are sent.
     #[inline]
     pub fn push<A>(&mut self, index: usize, len: usize, aim: impl FnOnce(&mut RayPacket) -> (A, u32)) -> (A, u32) {
-        let packet = if DENSE { &mut *self.aimed } else { self.batch.push_packet() };
+        let packet = if self.dense { &mut *self.aimed } else { self.batch.push_packet() };
         let (told, mut sent) = aim(packet);
         self.needed[index] = sent;
         if self.how.all {
             packet.t_far[..len].fill(BEFORE_THE_LIGHT);
             sent = (1 << len) - 1;
         }
-        if DENSE {
+        if self.dense {
             for lane in lanes(sent) {
                 self.batch.push(&self.aimed.get(lane));
                 self.owners.push((index * LANES + lane) as u32);
@@ -93,7 +96,7 @@ impl<const DENSE: bool> Shadows<DENSE> {
         } else {
             backend.occluded_many(&mut self.batch, Coherence::Coherent);
         }
-        if DENSE {
+        if self.dense {
             for (k, packet) in self.batch.packets().iter().enumerate() {
                 for (owner, through) in self.owners[k * LANES..].iter().zip(unoccluded(packet)) {
                     self.visible[*owner as usize / LANES][*owner as usize % LANES] = through;
@@ -132,15 +135,16 @@ impl<const DENSE: bool> Shadows<DENSE> {
     }
 }
 
-/// Adds what a light would add where it is visible.
-pub fn take(block: &mut Block, shine: &Shine, visible: &F32) {
-    simd::run(Take { block, shine, visible });
+/// Adds what a light would add, as far as it is visible: `share` for each ray that got through.
+pub fn take(block: &mut Block, shine: &Shine, visible: &F32, share: f32) {
+    simd::run(Take { block, shine, visible, share });
 }
 
 struct Take<'a> {
     block: &'a mut Block,
     shine: &'a Shine,
     visible: &'a F32,
+    share: f32,
 }
 
 impl Kernel for Take<'_> {
@@ -148,9 +152,10 @@ impl Kernel for Take<'_> {
 
     #[inline(always)]
     fn run(self) {
+        let through = self.visible.map(|rays| rays * self.share);
         for (color, add) in self.block.color.iter_mut().zip(&self.shine.add) {
             for lane in 0..LANES {
-                color[lane] += if self.visible[lane] > 0.0 { add[lane] } else { 0.0 };
+                color[lane] += if through[lane] > 0.0 { add[lane] * through[lane] } else { 0.0 };
             }
         }
     }

@@ -8,7 +8,7 @@ use super::enclosures::Enclosures;
 use super::facets::Facets;
 use super::job::{Job, RayCounts, Work};
 use super::known::Known;
-use super::lights::{self, Lit};
+use super::lights;
 use super::media::{Media, Medium};
 use super::paint::Palette;
 use super::shade::{Branch, Onwards};
@@ -38,6 +38,8 @@ struct Waiting {
     ray: Ray,
     /// Object and primitive that the ray is inside of and can only hit, if that is known.
     inside: Option<[u32; 2]>,
+    /// Whether it goes to the inner side of a surface.
+    inwards: bool,
 }
 
 /// What the rays of a segment gather, one entry per sample.
@@ -106,10 +108,13 @@ pub struct Waves<'a, B, const SECONDARY: bool> {
     blocks: Vec<Block>,
     /// Blocks in use.
     used: usize,
-    shadows: Shadows<SECONDARY>,
+    shadows: Shadows,
+    /// Whether the rays at hand have bounced.
+    bounced: bool,
     /// What the light at hand would add to each block.
     shines: Vec<Shine>,
-    /// Unoccluded share of a light with a size, for each block.
+    /// The lanes of each block that ask about a light with a size, and how many of their rays got through.
+    wanted: Vec<u32>,
     visible: Vec<F32>,
     media: Media,
     onwards: Onwards,
@@ -153,8 +158,10 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             is_shapes,
             blocks: Vec::new(),
             used: 0,
+            bounced: false,
             shadows: Shadows::new(How { nearest: !skips.has(Skip::AnyHit), all: !skips.has(Skip::ShadowRays) }),
             shines: Vec::new(),
+            wanted: Vec::new(),
             visible: Vec::new(),
             media: Media::new(),
             onwards: Onwards::default(),
@@ -197,7 +204,9 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         }
         self.shade(segment);
         if SECONDARY {
+            self.bounced = true;
             self.secondary_waves(segment);
+            self.bounced = false;
         }
     }
 
@@ -210,13 +219,18 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             batch.clear();
             paths.clear();
             answered.clear();
-            for w in self.waiting.drain(newest..) {
-                let exit = w.inside.and_then(|id| Some((batch.len(), id, Enclosures::exit(self.scene, id, &w.ray)?)));
-                // A ray that ends before it starts asks the backend nothing.
-                batch.push(&exit.map_or(w.ray, |_| Ray { t_far: f32::NEG_INFINITY, ..w.ray }));
-                paths.push(w.path);
-                answered.extend(exit);
+            // Those that go inwards side by side: a block inside of closed shapes needs no light.
+            for inwards in [true, false] {
+                for w in self.waiting[newest..].iter().filter(|w| w.inwards == inwards) {
+                    let exit =
+                        w.inside.and_then(|id| Some((batch.len(), id, Enclosures::exit(self.scene, id, &w.ray)?)));
+                    // A ray that ends before it starts asks the backend nothing.
+                    batch.push(&exit.map_or(w.ray, |_| Ray { t_far: f32::NEG_INFINITY, ..w.ray }));
+                    paths.push(w.path);
+                    answered.extend(exit);
+                }
             }
+            self.waiting.truncate(newest);
             self.backend.intersect_many(&mut batch, Coherence::Incoherent);
             self.tally.inside += answered.len() as u64;
             for &(ray, id, t) in &answered {
@@ -337,10 +351,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             self.note_brightest();
         }
         for block in &self.blocks[..self.used] {
-            for lane in 0..block.len {
-                let add = Block::vec3(&block.weight, lane) * Block::vec3(&block.color, lane);
-                self.gathered.color[block.slot[lane] as usize] += add.as_dvec3();
-            }
+            self.gathered.add(block);
         }
         if SECONDARY {
             self.branch();
@@ -359,7 +370,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     /// Adds one light to all blocks: its shadow rays go out as one batch.
     fn light(&mut self, index: usize) {
         let (light, rules) = (self.known.lights[index], self.rules(index));
-        self.shadows.start(self.used);
+        self.shadows.start(self.used, self.bounced);
         self.shines.resize(self.used.max(self.shines.len()), Shine::NONE);
         for i in 0..self.used {
             let (block, shine) = (&self.blocks[i], &mut self.shines[i]);
@@ -373,7 +384,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         self.trace_shadows();
         let lit = self.shines.iter().zip(self.shadows.visible());
         for (block, (shine, visible)) in self.blocks.iter_mut().zip(lit) {
-            take(block, shine, visible);
+            take(block, shine, visible, 1.0);
         }
     }
 
@@ -383,20 +394,23 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         let (light, rules) = (self.known.lights[index], self.rules(index));
         let (rounds, all) = (self.job.light_samples.max(1), !self.job.skips.has(Skip::ShadowRays));
         let mut to_center = RayPacket::EMPTY;
-        let mut wanted = Vec::with_capacity(self.used);
+        self.wanted.clear();
         self.shines.resize(self.used.max(self.shines.len()), Shine::NONE);
         for i in 0..self.used {
             let (block, shine) = (&self.blocks[i], &mut self.shines[i]);
             let asked = aim::at_center(block, &light, self.seen_from, rules, &mut to_center, shine);
             self.note(i, asked, u64::from(rounds));
-            wanted.push(asked.sent);
+            self.wanted.push(asked.sent);
         }
         self.visible.clear();
         self.visible.resize(self.used, [0.0; LANES]);
         for round in 0..rounds {
-            self.shadows.start(self.used);
-            for (i, &wanted) in wanted.iter().enumerate().filter(|(_, wanted)| all || **wanted != 0) {
-                let block = &self.blocks[i];
+            self.shadows.start(self.used, self.bounced);
+            for i in 0..self.used {
+                let (wanted, block) = (self.wanted[i], &self.blocks[i]);
+                if wanted == 0 && !all {
+                    continue;
+                }
                 let points = lights::points_on(block, &light, |lane| {
                     let (samples, sample) = segment.samples_of(block.slot[lane]);
                     let number = sample.wrapping_mul(rounds).wrapping_add(round);
@@ -413,15 +427,9 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
                 }
             }
         }
-        let share = 1.0 / rounds as f32;
-        for (block, visible) in self.blocks[..self.used].iter_mut().zip(&self.visible) {
-            if visible.iter().any(|&v| v > 0.0) {
-                let visible = visible.map(|v| v * share);
-                let to_light = lights::to_center(block, &light);
-                let lit = Lit { visible: &visible, to_light: &to_light, seen_from: self.seen_from };
-                let shines = rules.power || lights::shines(block);
-                lights::add(block, &light, lit, shines);
-            }
+        let lit = self.shines.iter().zip(&self.visible);
+        for (block, (shine, visible)) in self.blocks.iter_mut().zip(lit) {
+            take(block, shine, visible, 1.0 / rounds as f32);
         }
     }
 
@@ -441,7 +449,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
 
     /// Counts the shadow rays that block `index` did not need, in each of `rounds`, and bounds what was left out.
     fn note(&mut self, index: usize, asked: Asked, rounds: u64) {
-        self.tally.dull += u64::from(!asked.power);
+        self.tally.dull += u64::from(!asked.power && !asked.dark);
         self.tally.work.highlights += u64::from(asked.power);
         if self.job.skips.has(Skip::ShadowRays) {
             let count = |lanes: u32| rounds * u64::from(lanes.count_ones());
@@ -527,7 +535,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             medium,
         };
         let inside = (branch.inwards && self.known.enclosures.is_solitary(from)).then_some(from);
-        self.waiting.push(Waiting { path, ray, inside });
+        self.waiting.push(Waiting { path, ray, inside, inwards: branch.inwards });
     }
 }
 
@@ -540,6 +548,18 @@ impl Tally {
 }
 
 impl Gathered {
+    /// Adds what the hits of a block show.
+    fn add(&mut self, block: &Block) {
+        let add: [F32; 3] = [0, 1, 2].map(|k| {
+            let mut add = block.weight[k];
+            add.iter_mut().zip(&block.color[k]).for_each(|(weight, color)| *weight *= color);
+            add
+        });
+        for (lane, &slot) in block.slot[..block.len].iter().enumerate() {
+            self.color[slot as usize] += Block::vec3(&add, lane).as_dvec3();
+        }
+    }
+
     /// Notes that a branch of weight `most` was left out that could have brought `bound`.
     fn leave_out(&mut self, slot: u32, most: f32, bound: Bound) {
         let cut = &mut self.cut[slot as usize];
