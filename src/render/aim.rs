@@ -5,7 +5,7 @@ use super::lights;
 use crate::geom::{LANES, RayPacket};
 use crate::scene::Light;
 use crate::simd::{self, Kernel};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 /// End of a shadow ray that was sent at a light: just short of it.
 pub const BEFORE_THE_LIGHT: f32 = 1.0 - 4.0 * 0.5 * f32::EPSILON;
@@ -54,7 +54,7 @@ pub struct Asked {
     pub faint: u32,
     /// Whether highlights were computed.
     pub power: bool,
-    /// Whether nothing was: no light gets there.
+    /// Whether nothing was, as no lane can see the light.
     pub dark: bool,
 }
 
@@ -68,9 +68,6 @@ pub fn at_center(
     packet: &mut RayPacket,
     shine: &mut Shine,
 ) -> Asked {
-    if rules.outside && block.enclosed[..block.len].iter().all(|&enclosed| enclosed) {
-        return all_enclosed(block, packet);
-    }
     let view = &lights::view(block, seen_from);
     let power = rules.power || lights::shines(block);
     let asked = match (power, light.falloff.is_some()) {
@@ -80,14 +77,6 @@ pub fn at_center(
         (true, true) => simd::run(AtCenter::<true, true> { block, light, view, rules, packet, shine }),
     };
     Asked { power, ..asked }
-}
-
-/// What [`at_center`] tells where no light gets at all.
-fn all_enclosed(block: &Block, packet: &mut RayPacket) -> Asked {
-    packet.t_far = [f32::NEG_INFINITY; LANES];
-    let answers = |lane: &usize| Block::vec3(&block.diffuse, *lane) + Block::vec3(&block.specular, *lane) != Vec3::ZERO;
-    let enclosed = (0..block.len).filter(answers).fold(0, |lanes, lane| lanes | 1 << lane);
-    Asked { enclosed, dark: true, ..Asked::default() }
 }
 
 /// Shadow rays from the lanes `wanted` of a block to one point each, where that is not behind the
@@ -111,33 +100,34 @@ impl<const SPECULAR: bool, const FALLOFF: bool> Kernel for AtCenter<'_, SPECULAR
     #[inline(always)]
     fn run(self) -> Asked {
         let (b, l) = (self.block, self.light.position.to_array());
-        let mut d = [[0f32; LANES]; 3];
-        let (mut live, mut lit) = ([false; LANES], [false; LANES]);
-        for i in 0..LANES {
+        let mut asked = Asked::default();
+        let mut candidate = [false; LANES];
+        for (i, candidate) in candidate.iter_mut().enumerate() {
             let to_light = [0, 1, 2].map(|k| l[k] - b.p[k][i]);
             let answers = [0, 1, 2].map(|k| b.diffuse[k][i] + b.specular[k][i]);
-            live[i] = (i < b.len) & (answers[0] + answers[1] + answers[2] > 0.0);
+            let live = (i < b.len) & (answers[0] + answers[1] + answers[2] > 0.0);
+            let hidden = self.rules.outside & b.enclosed[i];
             // Dark for the facet is dark, whatever an interpolated normal says.
-            lit[i] = (along(&b.ng, i, to_light) > 0.0) & (along(&b.ns, i, to_light) > 0.0);
-            for k in 0..3 {
-                d[k][i] = from_front(b, i, k, l[k]);
-            }
+            let lit = (along(&b.ng, i, to_light) > 0.0) & (along(&b.ns, i, to_light) > 0.0);
+            *candidate = live & !hidden & lit;
+            asked.enclosed |= u32::from(live & hidden) << i;
+            asked.facing_away |= u32::from(live & !hidden & !lit) << i;
         }
+        if !candidate.iter().fold(false, |any, &one| any | one) {
+            self.packet.t_far = [f32::NEG_INFINITY; LANES];
+            return Asked { dark: true, ..asked };
+        }
+        let d = [0, 1, 2].map(|k| std::array::from_fn(|i| from_front(b, i, k, l[k])));
         let add = lights::answers::<SPECULAR, FALLOFF>(b, self.light, &d, self.view);
-        let mut asked = Asked::default();
         let mut t_far = [f32::NEG_INFINITY; LANES];
         for i in 0..LANES {
             let some = (add[0][i] != 0.0) | (add[1][i] != 0.0) | (add[2][i] != 0.0);
             let most = (b.weight[0][i] * add[0][i]).max(b.weight[1][i] * add[1][i]).max(b.weight[2][i] * add[2][i]);
-            let hidden = self.rules.outside & b.enclosed[i];
-            let candidate = live[i] & !hidden & lit[i] & some;
             let faint = (b.depth[i] > 0) & (most < self.rules.faint);
-            let send = candidate & !faint;
+            let send = candidate[i] & some & !faint;
             t_far[i] = if send { BEFORE_THE_LIGHT } else { f32::NEG_INFINITY };
             asked.sent |= u32::from(send) << i;
-            asked.enclosed |= u32::from(live[i] & hidden) << i;
-            asked.facing_away |= u32::from(live[i] & !hidden & !lit[i]) << i;
-            asked.faint |= u32::from(candidate & faint) << i;
+            asked.faint |= u32::from(candidate[i] & some & faint) << i;
         }
         self.shine.add = add;
         fill(self.packet, b, d, t_far);
@@ -198,6 +188,7 @@ fn fill(p: &mut RayPacket, b: &Block, d: [F32; 3], t_far: F32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
 
     const ALL: Rules = Rules { faint: 0.0, outside: true, power: false };
 
@@ -226,12 +217,12 @@ mod tests {
         assert!(packet.t_far[1..].iter().all(|&t| t == f32::NEG_INFINITY), "only one lane is in use");
         assert_eq!(Block::vec3(&shine.add, 0), Vec3::new(0.5, 0.5, 0.0));
         let (away, packet, _) = asked(&b, DVec3::NEG_Y, ALL);
-        assert_eq!(away, Asked { facing_away: 1, ..Asked::default() });
+        assert_eq!(away, Asked { facing_away: 1, dark: true, ..Asked::default() });
         assert!(packet.t_far.iter().all(|&t| t == f32::NEG_INFINITY));
         b.ns[1] = [-1.0; LANES];
         assert_eq!(asked(&b, DVec3::Y, ALL).0.facing_away, 1, "either normal may say that it is dark");
         b.diffuse = [[0.0; LANES]; 3];
-        assert_eq!(asked(&b, DVec3::NEG_Y, ALL).0, Asked::default(), "no light can change it");
+        assert_eq!(asked(&b, DVec3::NEG_Y, ALL).0, Asked { dark: true, ..Asked::default() }, "no light can change it");
     }
 
     #[test]

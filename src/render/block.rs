@@ -137,6 +137,17 @@ impl Block {
         }
     }
 
+    /// Notes that the colours of its lanes go to samples in a row, the first of them `first`, seen by camera rays.
+    #[inline]
+    pub fn set_samples(&mut self, first: u32) {
+        let path = Path::of_sample(first);
+        self.slot = std::array::from_fn(|lane| first + lane as u32);
+        self.depth = [path.depth; LANES];
+        self.branch = [path.branch; LANES];
+        self.medium = [path.medium; LANES];
+        self.weight = path.weight.to_array().map(|weight| [weight; LANES]);
+    }
+
     /// The path that `lane` is on.
     #[inline]
     #[must_use]
@@ -301,23 +312,31 @@ impl Kernel for Leave<'_> {
     }
 }
 
-/// Origins of the rays that leave on the ray's side ([`geom::offset_origin`](crate::geom::offset_origin)
-/// for all lanes), and everything into the block.
+/// Everything into the block.
 #[inline(always)]
-pub fn leave(r: &Points, b: &mut Block) {
-    for i in 0..LANES {
-        let (p, ng) = (get(&r.lifted, i), get(&r.ng, i));
-        let delta = 4.0 * EPS * (p[0].abs().max(p[1].abs()).max(p[2].abs()) + r.extent[i]);
-        for k in 0..3 {
-            b.front[k][i] = round_away(p[k] + delta * ng[k], ng[k]);
-        }
-        b.entering[i] = r.side[i] > 0.0;
-    }
+fn leave(r: &Points, b: &mut Block) {
     b.p = r.p;
     b.ng = r.ng;
     b.ns = r.ns;
     b.extent = r.extent;
     b.to_eye = r.to_eye;
+    for i in 0..LANES {
+        b.entering[i] = r.side[i] > 0.0;
+    }
+    fronts(&r.lifted, b);
+}
+
+/// Origins of the rays that leave on the ray's side, from the `lifted` points of a block: those of
+/// [`geom::offset_origin`](crate::geom::offset_origin), for all lanes.
+#[inline(always)]
+pub fn fronts(lifted: &[F64; 3], b: &mut Block) {
+    for i in 0..LANES {
+        let (p, ng) = (get(lifted, i), get(&b.ng, i));
+        let delta = 4.0 * EPS * (p[0].abs().max(p[1].abs()).max(p[2].abs()) + b.extent[i]);
+        for k in 0..3 {
+            b.front[k][i] = round_away(p[k] + delta * ng[k], ng[k]);
+        }
+    }
 }
 
 /// `x` in f32, rounded towards the sign of `side`.

@@ -2,7 +2,7 @@
 
 #![expect(clippy::needless_range_loop, reason = "an index runs over many arrays at once")]
 
-use super::block::{Block, F32, F64, Hits, Points, V, get, leave, put, wide};
+use super::block::{Block, F32, F64, Hits, V, fronts, get, put, wide};
 use super::paint::Palette;
 use crate::geom::{LANES, RayHitPacket, TriangleMesh};
 use crate::scene::obj::CornerData;
@@ -116,6 +116,39 @@ impl<'a> Facets<'a> {
     /// Looks up what belongs to the hits of the first `len` lanes: first where everything
     /// is, then everything, so that the memory has many questions to work on at a time.
     fn gather(&mut self, block: &mut Block, palette: &Palette) {
+        if self.is_one_triangle(block.len) {
+            self.gather_one(block);
+        } else {
+            self.gather_many(block);
+        }
+        block.paint_all(palette);
+    }
+
+    /// Whether all lanes hit the same triangle, as those of neighbours mostly do where triangles are large.
+    fn is_one_triangle(&self, len: usize) -> bool {
+        let differ = |ids: &[u32; LANES]| ids.iter().fold(0, |bits, id| bits | (id ^ ids[0]));
+        len == LANES && differ(&self.prim) | differ(&self.geom) == 0
+    }
+
+    /// Looks it up in the first lane, and copies that to the others.
+    fn gather_one(&mut self, block: &mut Block) {
+        let (at, prim) = (*self.buffers(0), self.prim[0] as usize);
+        if at.placed.is_some() || at.mesh.mirrored {
+            return self.gather_many(block);
+        }
+        block.material = [at.first_material + at.materials.map_or(0, |m| m[prim]); LANES];
+        let all = |to: &mut [F32; 3], v: Vec3| *to = v.to_array().map(|x| [x; LANES]);
+        for (to, i) in self.corners.iter_mut().zip(at.triangles.faces()[prim]) {
+            all(to, at.triangles.point(i));
+        }
+        let normals = at.normals.and_then(|(indices, values)| values.three(indices[prim]));
+        self.smooth = [normals.is_some(); LANES];
+        for (to, n) in self.normals.iter_mut().zip(normals.into_iter().flatten()) {
+            all(to, n.into());
+        }
+    }
+
+    fn gather_many(&mut self, block: &mut Block) {
         let mut faces = [[0; 3]; LANES];
         let mut normals = [[0; 3]; LANES];
         for lane in 0..block.len {
@@ -145,7 +178,6 @@ impl<'a> Facets<'a> {
                 self.rewind(lane);
             }
         }
-        block.paint_all(palette);
     }
 
     #[inline]
@@ -237,12 +269,12 @@ impl Kernel for Finish<'_, '_> {
 
     #[inline(always)]
     fn run(self) {
-        // Apart from what is read: the loops are vector code only if nothing may overlap.
-        let (mut points, mut weights) = (Points::EMPTY, [[0.0; LANES]; 3]);
-        refine(self.facets, &mut points, &mut weights);
-        shading_normals(self.facets, &mut points, &weights);
-        leave(&points, self.block);
-        self.facets.weights = weights;
+        let Self { facets, block } = self;
+        let (mut weights, mut lifted) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+        refine(facets, block, &mut weights);
+        shading_normals(facets, block, &weights, &mut lifted);
+        fronts(&lifted, block);
+        facets.weights = weights;
     }
 }
 
@@ -269,7 +301,7 @@ fn cross(a: V, b: V) -> V {
 /// The steps of [`geom::triangle::refine`](crate::geom::triangle::refine) for all lanes, and the
 /// facet's normal turned to the ray.
 #[inline(always)]
-fn refine(f: &Facets<'_>, out: &mut Points, weights: &mut [F64; 3]) {
+fn refine(f: &Facets<'_>, out: &mut Block, weights: &mut [F64; 3]) {
     for i in 0..LANES {
         let (o, d) = (wide(&f.o, i), wide(&f.d, i));
         let p0 = wide(&f.corners[0], i);
@@ -289,8 +321,8 @@ fn refine(f: &Facets<'_>, out: &mut Points, weights: &mut [F64; 3]) {
         let shrink = 1.0 / (u + v).max(1.0);
         let (u, v) = (u * shrink, v * shrink);
         let p = [0, 1, 2].map(|k| p0[k] + u * e1[k] + v * e2[k]);
+        out.entering[i] = along < 0.0;
         let side = if along < 0.0 { 1.0 } else { -1.0 };
-        out.side[i] = side;
         let unit = scale(ng, side / dot(ng, ng).sqrt());
         put(&mut out.p, i, p);
         put(&mut out.ng, i, unit);
@@ -314,18 +346,19 @@ fn refine(f: &Facets<'_>, out: &mut Points, weights: &mut [F64; 3]) {
 ///
 /// Source of the lift: J. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, ch. 4.
 #[inline(always)]
-fn shading_normals(f: &Facets<'_>, out: &mut Points, weights: &[F64; 3]) {
+fn shading_normals(f: &Facets<'_>, out: &mut Block, weights: &[F64; 3], lifted: &mut [F64; 3]) {
     if f.flat {
         out.ns = out.ng;
-        out.lifted = out.p;
+        *lifted = out.p;
         return;
     }
     for i in 0..LANES {
         let (p, ng) = (get(&out.p, i), get(&out.ng, i));
+        let side = if out.entering[i] { 1.0 } else { -1.0 };
         let mut sum = [0.0; 3];
         let mut lift = [0.0; 3];
         for c in 0..3 {
-            let n = scale(wide(&f.normals[c], i), out.side[i]);
+            let n = scale(wide(&f.normals[c], i), side);
             let weight = weights[c][i];
             let below = dot(sub(p, wide(&f.corners[c], i)), n).min(0.0);
             for k in 0..3 {
@@ -341,7 +374,7 @@ fn shading_normals(f: &Facets<'_>, out: &mut Points, weights: &[F64; 3]) {
         let lifts = usable & facing;
         for k in 0..3 {
             out.ns[k][i] = if usable { sum[k] * inv } else { ng[k] };
-            out.lifted[k][i] = if lifts { p[k] - lift[k] } else { p[k] };
+            lifted[k][i] = if lifts { p[k] - lift[k] } else { p[k] };
         }
     }
 }

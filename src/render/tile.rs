@@ -116,15 +116,11 @@ impl<'a> Segment<'a> {
     /// Fills `batch` with the camera rays; what was drawn for each.
     pub fn camera_rays(&self, camera: &Camera, job: &Job, batch: &mut PacketBatch<RayHitPacket>) -> Drawn {
         batch.resize(self.pixels.len() * self.samples as usize);
-        let end = self.first + self.samples;
-        let mut rays = self.pixels.iter().flat_map(|&pixel| (self.first..end).map(move |sample| (pixel, sample)));
         let drawn = Drawn::of(camera, job);
         let draw = Draw::of(self, drawn);
         let (mut asked, mut at, mut lens) = (Asked::default(), [[0.0; LANES]; 2], [[0.0; LANES]; 2]);
-        for (packet, live) in batch.packets_mut() {
-            for (lane, ((x, y), sample)) in rays.by_ref().take(live).enumerate() {
-                (asked.x[lane], asked.y[lane], asked.sample[lane]) = (x, y, sample);
-            }
+        for (k, (packet, live)) in batch.packets_mut().enumerate() {
+            self.ask((k * LANES) as u32, live, &mut asked);
             let points = draw.points(self.sampling, &asked, live);
             match &points {
                 Some([a, b, ..]) if job.spp > 1 => simd::run(Jittered { job, of: [a, b], asked: &asked, at: &mut at }),
@@ -143,6 +139,28 @@ impl<'a> Segment<'a> {
             CameraRays { camera, at: &at, lens: &lens, packet: &mut packet.ray }.fill();
         }
         drawn
+    }
+}
+
+impl Segment<'_> {
+    /// Pixels and samples of rays from `first` on.
+    fn ask(&self, first: u32, live: usize, asked: &mut Asked) {
+        if self.samples == 1 {
+            for (lane, &(x, y)) in self.pixels[first as usize..][..live].iter().enumerate() {
+                (asked.x[lane], asked.y[lane]) = (x, y);
+            }
+            asked.sample = [self.first; LANES];
+            return;
+        }
+        let (mut pixel, mut sample) = (first / self.samples, first % self.samples);
+        for lane in 0..live {
+            (asked.x[lane], asked.y[lane]) = self.pixels[pixel as usize];
+            asked.sample[lane] = self.first + sample;
+            sample += 1;
+            if sample == self.samples {
+                (pixel, sample) = (pixel + 1, 0);
+            }
+        }
     }
 }
 

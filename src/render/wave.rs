@@ -31,6 +31,41 @@ const MOST_AT_ONCE: usize = 1 << 14;
 /// most that many more waiting, however deep the recursion may go.
 const MANY_WAITING: usize = 1 << 19;
 
+/// The paths of the rays of a batch.
+trait Paths {
+    /// That of ray `i`.
+    fn one(&self, i: usize) -> Path;
+
+    /// Those of a packet, from ray `first` on.
+    fn sixteen(&self, first: usize, block: &mut Block) {
+        for lane in 0..LANES {
+            block.set(lane, &self.one(first + lane));
+        }
+    }
+}
+
+/// Those of camera rays: ray `i` belongs to sample `i`.
+struct OfSamples;
+
+impl Paths for OfSamples {
+    #[inline]
+    fn one(&self, i: usize) -> Path {
+        Path::of_sample(i as u32)
+    }
+
+    #[inline]
+    fn sixteen(&self, first: usize, block: &mut Block) {
+        block.set_samples(first as u32);
+    }
+}
+
+impl Paths for Vec<Path> {
+    #[inline]
+    fn one(&self, i: usize) -> Path {
+        self[i]
+    }
+}
+
 /// A secondary ray that waits for its turn.
 #[derive(Clone, Copy, Debug)]
 struct Waiting {
@@ -194,7 +229,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         if let Some(range) = self.clip {
             batch.packets_mut().for_each(|(packet, live)| clip(packet, live, range));
         }
-        self.collect(batch, |i| Path::of_sample(i as u32));
+        self.collect(batch, &OfSamples);
         if let Some(seen) = &mut self.gathered.seen {
             seen.clear();
             self.tally.work.hits_kept += self.blocks[..self.used].iter().map(|b| b.len as u64).sum::<u64>();
@@ -236,36 +271,36 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             for &(ray, id, t) in &answered {
                 batch.answer(ray, id, t);
             }
-            self.collect(&batch, |i| paths[i]);
+            self.collect(&batch, &paths);
             self.shade(segment);
         }
     }
 
     /// Misses take the background, hits fill blocks.
-    fn collect(&mut self, batch: &PacketBatch<RayHitPacket>, path: impl Fn(usize) -> Path) {
+    fn collect(&mut self, batch: &PacketBatch<RayHitPacket>, paths: &impl Paths) {
         self.used = 0;
         self.tally.work.hits_sorted += if self.is_mixed { batch.len() as u64 } else { 0 };
-        self.misses(batch, &path);
+        self.misses(batch, paths);
         if let Some(mut hits) = self.facets.take() {
             let before = hits.smooth_blocks;
-            self.fill_blocks(&mut *hits, batch, false, &path);
+            self.fill_blocks(&mut *hits, batch, false, paths);
             self.tally.work.smooth_blocks += hits.smooth_blocks - before;
             self.facets = Some(hits);
         }
         if let Some(mut hits) = self.shape_hits.take() {
-            self.fill_blocks(&mut *hits, batch, true, &path);
+            self.fill_blocks(&mut *hits, batch, true, paths);
             self.shape_hits = Some(hits);
         }
     }
 
-    fn misses(&mut self, batch: &PacketBatch<RayHitPacket>, path: &impl Fn(usize) -> Path) {
+    fn misses(&mut self, batch: &PacketBatch<RayHitPacket>, paths: &impl Paths) {
         for (k, packet) in batch.packets().iter().enumerate() {
             if all_hit(packet) {
                 continue;
             }
             let live = (batch.len() - k * LANES).min(LANES);
             for i in (0..live).filter(|&i| packet.hit.geom_id[i] == INVALID_ID) {
-                let path = path(k * LANES + i);
+                let path = paths.one(k * LANES + i);
                 let weight = if self.absorbs {
                     self.media.absorbed(&self.scene.materials, &path, f64::INFINITY)
                 } else {
@@ -282,7 +317,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         hits: &mut H,
         batch: &PacketBatch<RayHitPacket>,
         shapes: bool,
-        path: &impl Fn(usize) -> Path,
+        paths: &impl Paths,
     ) {
         // Nothing to sort out, nothing to work out: whole packets can go over.
         let as_they_are = !self.is_mixed && !self.absorbs;
@@ -292,8 +327,8 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
             if lane == 0 && live == LANES && as_they_are && all_hit(packet) {
                 hits.set_all(packet);
                 let block = self.next_block();
+                paths.sixteen(k * LANES, block);
                 for i in 0..LANES {
-                    block.set(i, &path(k * LANES + i));
                     block.id[i] = [packet.hit.geom_id[i], packet.hit.prim_id[i]];
                 }
                 self.finish(hits, LANES);
@@ -304,7 +339,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
                 if geom == INVALID_ID || (self.is_mixed && self.is_shapes[geom as usize] != shapes) {
                     continue;
                 }
-                let mut path = path(k * LANES + i);
+                let mut path = paths.one(k * LANES + i);
                 if self.absorbs {
                     path.weight = self.media.absorbed(&self.scene.materials, &path, distance(packet, i));
                 }
@@ -449,8 +484,10 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
 
     /// Counts the shadow rays that block `index` did not need, in each of `rounds`, and bounds what was left out.
     fn note(&mut self, index: usize, asked: Asked, rounds: u64) {
-        self.tally.dull += u64::from(!asked.power && !asked.dark);
-        self.tally.work.highlights += u64::from(asked.power);
+        if !asked.dark {
+            self.tally.dull += u64::from(!asked.power);
+            self.tally.work.highlights += u64::from(asked.power);
+        }
         if self.job.skips.has(Skip::ShadowRays) {
             let count = |lanes: u32| rounds * u64::from(lanes.count_ones());
             self.tally.facing_away += count(asked.facing_away);
