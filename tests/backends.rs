@@ -113,13 +113,8 @@ fn scene() -> impl Strategy<Value = Scene> {
 }
 
 fn build(kind: BackendKind, scene: &Scene) -> AnyBackend {
-    let options = BuildOptions {
-        threads: 1,
-        rays_expected: 1 << 40,
-        cancel: &AtomicBool::new(false),
-        memory_limit: None,
-        progress: None,
-    };
+    let cancel = AtomicBool::new(false);
+    let options = BuildOptions { threads: 1, rays_expected: 1 << 40, ..BuildOptions::new(&cancel) };
     AnyBackend::build(kind, scene, &options).expect("a good scene")
 }
 

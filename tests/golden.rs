@@ -110,13 +110,8 @@ fn job(loaded: &Loaded, width: u32, spp: u32) -> Job {
 }
 
 fn render(kind: BackendKind, loaded: &Loaded, camera: &CameraDesc, job: &Job) -> Film {
-    let options = BuildOptions {
-        threads: 0,
-        rays_expected: 1 << 40,
-        cancel: &AtomicBool::new(false),
-        memory_limit: None,
-        progress: None,
-    };
+    let cancel = AtomicBool::new(false);
+    let options = BuildOptions { rays_expected: 1 << 40, ..BuildOptions::new(&cancel) };
     let backend = AnyBackend::build(kind, &loaded.scene, &options).expect("a good scene");
     let outcome = render::run(&loaded.scene, camera, &backend, job, &Control::default()).expect("a good camera");
     assert_eq!(outcome.stats.non_finite_samples, 0, "{kind:?}");

@@ -62,13 +62,8 @@ fn job(w: u32, h: u32) -> Job {
 }
 
 fn render(kind: BackendKind, scene: &Scene, camera: &CameraDesc, job: &Job) -> Outcome {
-    let options = BuildOptions {
-        threads: 0,
-        rays_expected: 1 << 40,
-        cancel: &AtomicBool::new(false),
-        memory_limit: None,
-        progress: None,
-    };
+    let cancel = AtomicBool::new(false);
+    let options = BuildOptions { rays_expected: 1 << 40, ..BuildOptions::new(&cancel) };
     let backend = AnyBackend::build(kind, scene, &options).expect("a good scene");
     render::run(scene, camera, &backend, job, &Control::default()).expect("a good camera")
 }
@@ -298,13 +293,8 @@ fn auxiliary_images_tell_what_was_hit() {
 #[test]
 fn a_cancelled_render_keeps_what_is_done() {
     let (scene, camera) = lit_ball();
-    let options = BuildOptions {
-        threads: 0,
-        rays_expected: 0,
-        cancel: &AtomicBool::new(false),
-        memory_limit: None,
-        progress: None,
-    };
+    let cancel = AtomicBool::new(false);
+    let options = BuildOptions { rays_expected: 0, ..BuildOptions::new(&cancel) };
     let backend = AnyBackend::build(BackendKind::COMPILED[0], &scene, &options).expect("a good scene");
     let control = Control::default();
     let big = Job { spp: 4096, ..job(640, 480) };

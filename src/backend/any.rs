@@ -59,7 +59,13 @@ impl std::fmt::Debug for BuildOptions<'_> {
 /// of building per million triangles and costs 0.02 s per million packet rays.
 const RAYS_PER_PRIMITIVE_WORTH_A_GOOD_BUILD: u64 = 10;
 
-impl BuildOptions<'_> {
+impl<'a> BuildOptions<'a> {
+    /// A good hierarchy, built on all threads, in whatever memory it takes.
+    #[must_use]
+    pub fn new(cancel: &'a AtomicBool) -> Self {
+        Self { threads: 0, rays_expected: u64::MAX, memory_limit: None, cancel, progress: None }
+    }
+
     /// Whether a quick hierarchy is the better deal for this scene.
     #[must_use]
     pub fn prefers_quick_build(&self, scene: &Scene) -> bool {

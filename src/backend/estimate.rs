@@ -94,8 +94,7 @@ mod tests {
     fn check(scene: &Scene, error: f64) {
         for &kind in BackendKind::COMPILED {
             for rays_expected in [0, u64::MAX] {
-                let options =
-                    BuildOptions { threads: 0, rays_expected, cancel: &GO_ON, memory_limit: None, progress: None };
+                let options = BuildOptions { rays_expected, ..BuildOptions::new(&GO_ON) };
                 let estimate = Estimate::of(kind, scene, &options);
                 let built = AnyBackend::build(kind, scene, &options).expect("it is small");
                 let off = |is: u64, said: u64| (is as f64 / said as f64 - 1.0).abs();
@@ -126,8 +125,7 @@ mod tests {
         let scene = Scene::of(vec![Object::Mesh(Mesh::bare(example::mesh(30_000, Surface::Rock)))]);
         let build = |kind, memory_limit| {
             // One thread: what several hold at once differs from run to run.
-            let options =
-                BuildOptions { threads: 1, rays_expected: u64::MAX, cancel: &GO_ON, memory_limit, progress: None };
+            let options = BuildOptions { threads: 1, memory_limit, ..BuildOptions::new(&GO_ON) };
             AnyBackend::build(kind, &scene, &options)
         };
         for &kind in BackendKind::COMPILED {

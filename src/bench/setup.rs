@@ -50,9 +50,5 @@ pub fn build(kind: BackendKind, scene: &Scene) -> Result<AnyBackend, Error> {
 /// As [`AnyBackend::build`].
 pub fn build_on(kind: BackendKind, scene: &Scene, threads: usize) -> Result<AnyBackend, Error> {
     let cancel = AtomicBool::new(false);
-    AnyBackend::build(
-        kind,
-        scene,
-        &BuildOptions { threads, rays_expected: u64::MAX, cancel: &cancel, memory_limit: None, progress: None },
-    )
+    AnyBackend::build(kind, scene, &BuildOptions { threads, ..BuildOptions::new(&cancel) })
 }

@@ -31,7 +31,7 @@ impl Cost {
     /// With the hierarchies that so many rays would have built, estimated.
     pub fn of_unbuilt(scene: &Scene, kinds: &[BackendKind], rays_expected: u64) -> Self {
         let cancel = AtomicBool::new(false);
-        let options = BuildOptions { threads: 0, rays_expected, cancel: &cancel, memory_limit: None, progress: None };
+        let options = BuildOptions { rays_expected, ..BuildOptions::new(&cancel) };
         let estimates = kinds.iter().map(|&kind| Estimate::of(kind, scene, &options));
         Self::of(scene).with(estimates.map(|e| (e.bytes, e.peak_bytes)))
     }

@@ -332,10 +332,8 @@ impl Run<'_> {
     fn build_options(&self) -> BuildOptions<'_> {
         BuildOptions {
             threads: self.plan.threads,
-            rays_expected: u64::MAX,
-            cancel: &self.control.cancel,
             memory_limit: self.memory.free().filter(|_| self.memory.is_limited()),
-            progress: None,
+            ..BuildOptions::new(&self.control.cancel)
         }
     }
 

@@ -110,8 +110,7 @@ impl Prober {
     /// As [`ExactMaker::build`].
     pub fn new(scene: impl Into<Arc<Scene>>, kind: BackendKind) -> Result<Self, Error> {
         static GO_ON: AtomicBool = AtomicBool::new(false);
-        let options =
-            BuildOptions { threads: 0, rays_expected: u64::MAX, cancel: &GO_ON, memory_limit: None, progress: None };
+        let options = BuildOptions::new(&GO_ON);
         Self::build(scene, &ExactMaker::new(kind, 0)?, &options)
     }
 

@@ -47,9 +47,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let build = BuildOptions {
         threads,
         rays_expected: 3 * u64::from(args.size.0) * u64::from(args.size.1),
-        cancel: &cancel,
-        memory_limit: None,
-        progress: None,
+        ..BuildOptions::new(&cancel)
     };
     let backend = pool.install(|| AnyBackend::build(BackendKind::Embree, &scene, &build))?;
     let AnyBackend::Embree(embree) = &backend else { unreachable!("it was asked for") };

@@ -59,8 +59,7 @@ fn rows(name: &str, scene: &Scene) -> Result<(), Box<dyn std::error::Error>> {
             let before = rss("VmRSS:");
             // Forgets the peak of what came before.
             let forgotten = std::fs::write("/proc/self/clear_refs", "5").is_ok();
-            let options =
-                BuildOptions { threads: 0, rays_expected, memory_limit: None, cancel: &GO_ON, progress: None };
+            let options = BuildOptions { rays_expected, ..BuildOptions::new(&GO_ON) };
             let built = AnyBackend::build(kind, scene, &options)?;
             let grown =
                 before.zip(rss("VmHWM:")).filter(|_| forgotten).map(|(before, peak)| peak.saturating_sub(before));

@@ -62,7 +62,7 @@ fn one_of_each() -> Scene {
 }
 
 fn options(cancel: &AtomicBool) -> BuildOptions<'_> {
-    BuildOptions { threads: 2, rays_expected: 1_000_000, cancel, memory_limit: None, progress: None }
+    BuildOptions { threads: 2, rays_expected: 1_000_000, ..BuildOptions::new(cancel) }
 }
 
 #[test]

@@ -17,13 +17,8 @@ pub fn load(toml: &str) -> Loaded {
 }
 
 pub fn build(kind: BackendKind, loaded: &Loaded) -> AnyBackend {
-    let options = BuildOptions {
-        threads: 0,
-        rays_expected: 1 << 40,
-        cancel: &AtomicBool::new(false),
-        memory_limit: None,
-        progress: None,
-    };
+    let cancel = AtomicBool::new(false);
+    let options = BuildOptions { rays_expected: 1 << 40, ..BuildOptions::new(&cancel) };
     AnyBackend::build(kind, &loaded.scene, &options).expect("a good scene")
 }
 

@@ -19,7 +19,7 @@ fn agree(path: &Path, quick: bool) {
     let (scene, camera) = load(path);
     let build = |kind| {
         let rays_expected = if quick { 0 } else { u64::MAX };
-        let options = BuildOptions { threads: 1, rays_expected, cancel: &GO_ON, memory_limit: None, progress: None };
+        let options = BuildOptions { threads: 1, rays_expected, ..BuildOptions::new(&GO_ON) };
         AnyBackend::build(kind, &scene, &options).expect("a good scene")
     };
     let (AnyBackend::Embree(embree), AnyBackend::Native(native)) =

@@ -33,7 +33,7 @@ pub fn done(subject: &Subject, assets: &Assets, kind: BackendKind, skips: Skips)
     }
     let rays = job.crop.pixels() * u64::from(job.spp) * (1 + loaded.scene.lights.len() as u64);
     let rays_expected = if skips.has(Skip::BuildQuality) { rays } else { u64::MAX };
-    let options = BuildOptions { threads: 0, rays_expected, cancel: &cancel, memory_limit: None, progress: None };
+    let options = BuildOptions { rays_expected, ..BuildOptions::new(&cancel) };
     let backend = AnyBackend::build(kind, &loaded.scene, &options)?;
     let outcome = render::run(&loaded.scene, &camera, &backend, &job, &Control::default()).map_err(Error::Camera)?;
     Ok(Done { quick: backend.is_quick(), loaded, outcome, seconds: start.elapsed().as_secs_f64() })

@@ -56,8 +56,7 @@ impl<'a> Lines<'a> {
 
     fn prober(&self, placed: &Placed, at: usize) -> Result<Prober, Wrong> {
         let scene = Scene::of_one(placed.shape, &placed.to_world).map_err(|e| Fault::new(at, e.to_string()))?;
-        let options =
-            BuildOptions { threads: 1, rays_expected: 1, cancel: self.cancel, memory_limit: None, progress: None };
+        let options = BuildOptions { threads: 1, rays_expected: 1, ..BuildOptions::new(self.cancel) };
         Prober::build(scene, self.maker, &options).map_err(Wrong::Backend)
     }
 }
