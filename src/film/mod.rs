@@ -34,14 +34,19 @@ pub struct Film {
     pub finished: usize,
 }
 
+/// Pixels in a page of memory.
+const PAGE: usize = 4096 / size_of::<[f32; 3]>();
+
 impl Film {
     /// A black image with room for `aovs`.
     #[must_use]
     pub fn new(width: u32, height: u32, aovs: &[Aov]) -> Self {
         let pixels = width as usize * height as usize;
-        // Filled on all threads: the first touch of fresh memory is most of the cost.
+        // Each page touched on all threads: the first touch of fresh memory is most of the cost.
         let mut color = zeroes::<[f32; 3]>(pixels);
-        color.par_chunks_mut(1 << 14).for_each(|part| part.fill([0.0; 3]));
+        color
+            .par_chunks_mut(1 << 14)
+            .for_each(|part| part.iter_mut().step_by(PAGE).for_each(|pixel| *pixel = [0.0; 3]));
         Self { width, height, color, aovs: aovs.iter().map(|&kind| AovImage::new(kind, pixels)).collect(), finished: 0 }
     }
 

@@ -117,7 +117,13 @@ impl<const SPECULAR: bool, const FALLOFF: bool> Kernel for AtCenter<'_, SPECULAR
             self.packet.t_far = [f32::NEG_INFINITY; LANES];
             return Asked { dark: true, ..asked };
         }
-        let d = [0, 1, 2].map(|k| std::array::from_fn(|i| from_front(b, i, k, l[k])));
+        // Loops, for the calls that `map` makes are no vector code.
+        let mut d = [[0f32; LANES]; 3];
+        for (k, d) in d.iter_mut().enumerate() {
+            for (i, d) in d.iter_mut().enumerate() {
+                *d = from_front(b, i, k, l[k]);
+            }
+        }
         let add = lights::answers::<SPECULAR, FALLOFF>(b, self.light, &d, self.view);
         let mut t_far = [f32::NEG_INFINITY; LANES];
         for i in 0..LANES {

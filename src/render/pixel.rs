@@ -3,6 +3,7 @@
 use super::surface::SurfacePoint;
 use crate::film::{Aov, AovImage};
 use crate::geom::{LANES, RayHitPacket};
+use crate::simd::{self, Kernel};
 use glam::{DVec3, Vec3};
 
 /// The sums of one pixel's samples.
@@ -50,10 +51,10 @@ impl PixelSum {
     }
 
     /// Adds samples in their order.
-    pub fn add(&mut self, samples: &[DVec3], deviations: bool) {
+    pub fn add(&mut self, samples: &[impl Copy + Into<DVec3>], deviations: bool) {
         self.taken += samples.len() as u32;
         if !deviations {
-            for color in samples.iter().filter_map(|s| kept(*s)) {
+            for color in samples.iter().filter_map(|&s| kept(s.into())) {
                 self.color += color;
                 self.counted += 1;
             }
@@ -62,7 +63,7 @@ impl PixelSum {
         for part in samples.chunks(LANES) {
             let before = *self;
             let (mut colors, mut count) = ([DVec3::ZERO; LANES], 0);
-            for color in part.iter().filter_map(|s| kept(*s)) {
+            for color in part.iter().filter_map(|&s| kept(s.into())) {
                 self.color += color;
                 colors[count] = color;
                 count += 1;
@@ -125,14 +126,37 @@ impl Lone {
     }
 
     /// The next ones.
-    pub fn add(&mut self, samples: &[DVec3], cut: &[[f64; 2]]) {
-        self.color.extend(samples.iter().map(|sample| {
-            let color = sample.as_vec3();
-            let finite = color.is_finite();
-            self.non_finite += u64::from(!finite);
-            if finite { color.to_array() } else { [0.0; 3] }
-        }));
+    pub fn add(&mut self, samples: &[[f64; 3]], cut: &[[f64; 2]]) {
+        let before = self.color.len();
+        self.color.resize(before + samples.len(), [0.0; 3]);
+        let new = &mut self.color[before..];
+        if !simd::run(Narrow { from: samples.as_flattened(), to: new.as_flattened_mut() }) {
+            for color in new.iter_mut().filter(|color| color.iter().any(|c| !c.is_finite())) {
+                *color = [0.0; 3];
+                self.non_finite += 1;
+            }
+        }
         self.cut.extend_from_slice(cut);
+    }
+}
+
+/// Rounds to f32, and tells whether all of that is finite.
+struct Narrow<'a> {
+    from: &'a [f64],
+    to: &'a mut [f32],
+}
+
+impl Kernel for Narrow<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        let mut finite = true;
+        for (to, from) in self.to.iter_mut().zip(self.from) {
+            *to = *from as f32;
+            finite &= to.abs() < f32::INFINITY;
+        }
+        finite
     }
 }
 
@@ -255,8 +279,7 @@ mod tests {
 
     #[test]
     fn a_lone_sample_is_the_sum_of_one() {
-        let some =
-            [DVec3::new(0.1, 0.7, 1.0 / 3.0), DVec3::NAN, DVec3::new(1e300, 0.0, 0.0), DVec3::new(-0.1, 0.0, 9.0)];
+        let some = [[0.1, 0.7, 1.0 / 3.0], [f64::NAN; 3], [1e300, 0.0, 0.0], [-0.1, 0.0, 9.0]];
         let mut lone = Lone::default();
         lone.add(&some[..1], &[]);
         lone.add(&some[1..], &[]);

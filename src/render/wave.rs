@@ -21,7 +21,7 @@ use crate::backend::Backend;
 use crate::film::Aov;
 use crate::geom::{Coherence, INVALID_ID, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
 use crate::scene::{Material, Object, Reflect, Scene, Skip};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// Most secondary rays worked on at once; the rest waits, newest first, so that memory is
 /// bounded by depth and not by the number of branches.
@@ -81,7 +81,7 @@ struct Waiting {
 #[derive(Debug, Default)]
 pub struct Gathered {
     /// Linear RGB.
-    pub color: Vec<DVec3>,
+    pub color: Vec<[f64; 3]>,
     /// Bound on what was left out by the weight cut and `k_max`, linear: `(fixed, scaled)` as in [`Bound`].
     pub cut: Vec<[f64; 2]>,
     /// Rays sent for it, of all kinds; kept only if somebody asked.
@@ -211,7 +211,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
     pub fn trace(&mut self, batch: &mut PacketBatch<RayHitPacket>, segment: &Segment<'_>, coherence: Coherence) {
         let samples = batch.len();
         self.gathered.color.clear();
-        self.gathered.color.resize(samples, DVec3::ZERO);
+        self.gathered.color.resize(samples, [0.0; 3]);
         if SECONDARY {
             self.gathered.cut.clear();
             self.gathered.cut.resize(samples, [0.0; 2]);
@@ -306,7 +306,7 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
                 } else {
                     path.weight
                 };
-                self.gathered.color[path.slot as usize] += (weight * self.scene.background).as_dvec3();
+                self.gathered.add_one(path.slot, weight * self.scene.background);
             }
         }
     }
@@ -593,7 +593,15 @@ impl Gathered {
             add
         });
         for (lane, &slot) in block.slot[..block.len].iter().enumerate() {
-            self.color[slot as usize] += Block::vec3(&add, lane).as_dvec3();
+            self.add_one(slot, Block::vec3(&add, lane));
+        }
+    }
+
+    /// Adds to a sample.
+    #[inline]
+    fn add_one(&mut self, slot: u32, add: Vec3) {
+        for (sum, add) in self.color[slot as usize].iter_mut().zip(add.to_array()) {
+            *sum += f64::from(add);
         }
     }
 

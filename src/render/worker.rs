@@ -156,7 +156,7 @@ impl<'a, B: Backend, const SECONDARY: bool> TileWorker<'a, B, SECONDARY> {
             for (k, weight) in weights[..samples].iter_mut().enumerate() {
                 *weight = segment.weight((i * samples + k) as u32, job);
             }
-            sum.add_weighed(colors.iter().copied().zip(weights), deviations);
+            sum.add_weighed(colors.iter().map(|&color| color.into()).zip(weights), deviations);
             let cuts = gathered.cut.get(i * samples..(i + 1) * samples).unwrap_or_default();
             for (cut, weight) in cuts.iter().zip(&weights) {
                 sum.cut[0] += cut[0] * weight.abs();
