@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# All tests: the renderer with Embree, the bindings' layout, and the renderer without Embree.
+# All tests: the renderer with Embree, the bindings' layout and the other crate in sys/, and the renderer without Embree.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 cargo test --locked
-cargo test --locked -p embree4-sys
+cargo test --locked -p embree4-sys -p tison-pages
 cargo test --locked --no-default-features
