@@ -10,12 +10,14 @@ mod enclosures;
 mod estimate;
 mod explain;
 pub(crate) mod facets;
+mod gathered;
 mod job;
 mod known;
 mod lights;
 mod media;
 pub mod optics;
 pub(crate) mod paint;
+mod paths;
 mod pixel;
 mod reach;
 mod rounds;
@@ -40,13 +42,13 @@ use crate::scene::{Camera, CameraDesc, Needs, Scene, Skip};
 use adapt::Progress;
 use area::Area;
 use estimate::{ErrorSum, Twice};
+use gathered::Tally;
 use known::Known;
 use pixel::{FirstHits, PixelSum};
 use rounds::Rounds;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
-use wave::Tally;
 use worker::TileWorker;
 
 /// Renders on the current rayon pool. The same scene, job and backend give the same bytes,
@@ -232,22 +234,6 @@ impl<B: Backend, const SECONDARY: bool> Render<'_, B, SECONDARY> {
             blocks_without_highlight: sum.tally.dull,
         };
         Outcome { film: sum.film, stats }
-    }
-}
-
-impl Tally {
-    fn add(&mut self, o: &Self) {
-        self.rays.add(&o.rays);
-        self.facing_away += o.facing_away;
-        self.enclosed += o.enclosed;
-        self.faint += o.faint;
-        self.inside += o.inside;
-        self.below_cut += o.below_cut;
-        self.work.add(&o.work);
-        self.packets_outside += o.packets_outside;
-        self.dull += o.dull;
-        self.again += o.again;
-        self.brightest = self.brightest.max(o.brightest);
     }
 }
 

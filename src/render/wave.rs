@@ -3,25 +3,26 @@
 
 use super::aim::{self, Asked, Rules, Shine};
 use super::block::{Block, F32, Hits, Path, lanes};
-use super::certificate::Bound;
 use super::enclosures::Enclosures;
 use super::facets::Facets;
-use super::job::{Job, RayCounts, Work};
+use super::gathered::{Gathered, Tally};
+use super::job::Job;
 use super::known::Known;
 use super::lights;
 use super::media::{Media, Medium};
 use super::paint::Palette;
+use super::paths::{OfSamples, Paths};
 use super::shade::{Branch, Onwards};
 use super::shadows::{How, Shadows, take};
 use super::shapes::ShapeHits;
 use super::surface::SurfacePoint;
-use super::tile::{Drawn, Segment};
+use super::tile::Segment;
 use super::{Common, Render};
 use crate::backend::Backend;
 use crate::film::Aov;
 use crate::geom::{Coherence, INVALID_ID, LANES, PacketBatch, Ray, RayHitPacket, RayPacket};
 use crate::scene::{Material, Object, Reflect, Scene, Skip};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 /// Most secondary rays worked on at once; the rest waits, newest first, so that memory is
 /// bounded by depth and not by the number of branches.
@@ -30,41 +31,6 @@ const MOST_AT_ONCE: usize = 1 << 14;
 /// Once so many wait, only a packet's worth is worked on at once: each bounce then leaves at
 /// most that many more waiting, however deep the recursion may go.
 const MANY_WAITING: usize = 1 << 19;
-
-/// The paths of the rays of a batch.
-trait Paths {
-    /// That of ray `i`.
-    fn one(&self, i: usize) -> Path;
-
-    /// Those of a packet, from ray `first` on.
-    fn sixteen(&self, first: usize, block: &mut Block) {
-        for lane in 0..LANES {
-            block.set(lane, &self.one(first + lane));
-        }
-    }
-}
-
-/// Those of camera rays: ray `i` belongs to sample `i`.
-struct OfSamples;
-
-impl Paths for OfSamples {
-    #[inline]
-    fn one(&self, i: usize) -> Path {
-        Path::of_sample(i as u32)
-    }
-
-    #[inline]
-    fn sixteen(&self, first: usize, block: &mut Block) {
-        block.set_samples(first as u32);
-    }
-}
-
-impl Paths for Vec<Path> {
-    #[inline]
-    fn one(&self, i: usize) -> Path {
-        self[i]
-    }
-}
 
 /// A secondary ray that waits for its turn.
 #[derive(Clone, Copy, Debug)]
@@ -75,46 +41,6 @@ struct Waiting {
     inside: Option<[u32; 2]>,
     /// Whether it goes to the inner side of a surface.
     inwards: bool,
-}
-
-/// What the rays of a segment gather, one entry per sample.
-#[derive(Debug, Default)]
-pub struct Gathered {
-    /// Linear RGB.
-    pub color: Vec<[f64; 3]>,
-    /// Bound on what was left out by the weight cut and `k_max`, linear: `(fixed, scaled)` as in [`Bound`].
-    pub cut: Vec<[f64; 2]>,
-    /// Rays sent for it, of all kinds; kept only if somebody asked.
-    pub cost: Option<Vec<u32>>,
-    /// The hits of the camera rays with their samples, in order; kept only if somebody asked.
-    pub seen: Option<Vec<(u32, SurfacePoint)>>,
-}
-
-/// What was sent and what was left out.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Tally {
-    /// Rays sent.
-    pub rays: RayCounts,
-    /// Shadow rays that a surface facing away from its light made needless.
-    pub facing_away: u64,
-    /// Shadow rays from the inside of a closed shape to a light outside of it.
-    pub enclosed: u64,
-    /// Shadow rays to lights that would have added less than the weight cut.
-    pub faint: u64,
-    /// Rays inside of shapes that touch nothing, which no backend had to be asked about.
-    pub inside: u64,
-    /// Branches below the weight cut.
-    pub below_cut: u64,
-    /// What was done that can be left out.
-    pub work: Work,
-    /// Packets of camera rays that the backend was not asked about.
-    pub packets_outside: u64,
-    /// Blocks without a highlight, once for each light that shone on them.
-    pub dull: u64,
-    /// Rays of all kinds that were sent to compare with, and are not counted above.
-    pub again: u64,
-    /// Largest answer of a surface to all lights; kept only where a bound needs it.
-    pub brightest: f32,
 }
 
 /// The integrator of one thread: its scene, and buffers that are refilled and never freed.
@@ -573,43 +499,6 @@ impl<'a, B: Backend, const SECONDARY: bool> Waves<'a, B, SECONDARY> {
         };
         let inside = (branch.inwards && self.known.enclosures.is_solitary(from)).then_some(from);
         self.waiting.push(Waiting { path, ray, inside, inwards: branch.inwards });
-    }
-}
-
-impl Tally {
-    /// Counts what was drawn for so many camera rays.
-    pub fn note_drawn(&mut self, drawn: Drawn, rays: usize) {
-        self.work.pixel_points += if drawn.pixel { rays as u64 } else { 0 };
-        self.work.lens_points += if drawn.lens { rays as u64 } else { 0 };
-    }
-}
-
-impl Gathered {
-    /// Adds what the hits of a block show.
-    fn add(&mut self, block: &Block) {
-        let add: [F32; 3] = [0, 1, 2].map(|k| {
-            let mut add = block.weight[k];
-            add.iter_mut().zip(&block.color[k]).for_each(|(weight, color)| *weight *= color);
-            add
-        });
-        for (lane, &slot) in block.slot[..block.len].iter().enumerate() {
-            self.add_one(slot, Block::vec3(&add, lane));
-        }
-    }
-
-    /// Adds to a sample.
-    #[inline]
-    fn add_one(&mut self, slot: u32, add: Vec3) {
-        for (sum, add) in self.color[slot as usize].iter_mut().zip(add.to_array()) {
-            *sum += f64::from(add);
-        }
-    }
-
-    /// Notes that a branch of weight `most` was left out that could have brought `bound`.
-    fn leave_out(&mut self, slot: u32, most: f32, bound: Bound) {
-        let cut = &mut self.cut[slot as usize];
-        cut[0] += f64::from(most) * f64::from(bound.fixed);
-        cut[1] += f64::from(most) * f64::from(bound.scaled);
     }
 }
 

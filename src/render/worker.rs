@@ -1,9 +1,10 @@
 //! One thread's part of a render: samples of pixels, by segments.
 
 use super::estimate::Twice;
+use super::gathered::Tally;
 use super::pixel::{FirstHits, Lone, PixelSum};
 use super::tile::{self, Segment};
-use super::wave::{Tally, Waves};
+use super::wave::Waves;
 use super::{Common, Render};
 use crate::backend::Backend;
 use crate::geom::{Coherence, LANES, PacketBatch, RayHitPacket};
